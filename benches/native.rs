@@ -1,7 +1,7 @@
 //! Micro-benchmarks of the native tracer: `cargo bench --bench native [FILTER]`.
 //!
-//! They tell whether a change of one part is felt there; what a user gains, and how Embree does, is `twincast bench`'s to
-//! tell. Parts are reached through the public interface, in worlds where nearly all time goes into one of them.
+//! They tell whether a change of one part is felt there; what a user gains, and how Embree does, is `twincast bench`'s
+//! to tell. Parts are reached through the public interface, in worlds where nearly all time goes into one of them.
 
 use std::hint::black_box;
 use std::sync::Arc;

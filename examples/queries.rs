@@ -1,7 +1,8 @@
 //! What the library answers, on a mesh made of one's own arrays: `cargo run --release --example queries`.
 //!
-//! Hills of 131,072 triangles at a northing of 5,000,000 metres, where f32 has steps of half a metre: rays in batches on all cores, how much of the sky each
-//! place sees, all hits along a ray, the nearest point, and the same tree after the ground has moved.
+//! Hills of 131,072 triangles at a northing of 5,000,000 metres, where f32 has steps of half a metre: rays in batches
+//! on all cores, how much of the sky each place sees, all hits along a ray, the nearest point, and the same tree after
+//! the ground has moved.
 
 use std::sync::Arc;
 
@@ -27,7 +28,8 @@ fn main() -> Result<()> {
     let world = World::new(&scene)?;
     let mut bvh = Bvh::build(&world);
 
-    // Straight down, one ray a square. Rays are in the world's coordinates, which are f32 around the middle of the scene.
+    // Straight down, one ray a square. Rays are in the world's coordinates, which are f32 around the middle of the
+    // scene.
     let above = |i: u32| CORNER + DVec3::new(f64::from(i % SIDE) + 0.4, 100.0, f64::from(i / SIDE) + 0.3);
     let down: Vec<Ray> = (0..SIDE * SIDE).map(|i| world.ray(above(i), Vec3::NEG_Y)).collect();
     let mut hits: Vec<Option<Hit>> = vec![None; down.len()];
@@ -35,7 +37,8 @@ fn main() -> Result<()> {
     batches.for_each(|(rays, hits)| bvh.closest_batch(rays, hits, Batch::of(rays)));
     println!("{} of {} rays meet the ground", hits.iter().flatten().count(), down.len());
 
-    // Ambient occlusion: from where each of them ends, rays towards the sky that leave the surface without meeting it again.
+    // Ambient occlusion: from where each of them ends, rays towards the sky that leave the surface without meeting it
+    // again.
     let seen = |(ray, hit): (&Ray, &Option<Hit>)| Some(open_sky(&scene, &world, &bvh, ray, hit.as_ref()?));
     let sky: Vec<f64> = down.par_iter().zip(&hits).filter_map(seen).collect();
     println!("on average {:.1} % of the sky is seen", 100.0 * sky.iter().sum::<f64>() / sky.len() as f64);

@@ -1,4 +1,5 @@
-//! The benchmark: its rays are those of `benches/embree_ref.cpp`, its figures hang together, and it finds wrong answers.
+//! The benchmark: its rays are those of `benches/embree_ref.cpp`, its figures hang together, and it finds wrong
+//! answers.
 
 use std::path::Path;
 use std::sync::Arc;

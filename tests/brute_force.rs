@@ -9,7 +9,8 @@ use twincast::{Batch, Hit, Ray, Tracer, Width, World};
 use crate::accelerators::assert_accelerators;
 use crate::scenes::{self, Random};
 
-/// Closest hits and occlusion by rays alone, in flight and in bundles, with every preset and instruction set, against brute force.
+/// Closest hits and occlusion by rays alone, in flight and in bundles, with every preset and instruction set, against
+/// brute force.
 #[track_caller]
 pub(crate) fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
     let world = World::new(scene).expect("the scene is sound");
@@ -113,8 +114,8 @@ fn instances_and_spheres() {
     assert!(hits > 200, "{hits} hits");
 }
 
-/// Rays among small objects of many triangles, which are far finer than rays are apart: towards a light, and from an eye. Some are aimed at
-/// corners.
+/// Rays among small objects of many triangles, which are far finer than rays are apart: towards a light, and from an
+/// eye. Some are aimed at corners.
 #[test]
 fn objects_finer_than_rays() {
     use twincast::math::{DAffine3, DQuat, DVec3};
@@ -150,8 +151,8 @@ fn objects_finer_than_rays() {
     assert!((500..2200).contains(&hits), "{hits} of {}", rays.len());
 }
 
-/// Transforms of every kind: objects that are tiny, huge, flattened, sheared, mirrored, or far away for their size. Rays alone and in
-/// bundles; some bundles cross octants in the object's coordinates and not in the world's.
+/// Transforms of every kind: objects that are tiny, huge, flattened, sheared, mirrored, or far away for their size.
+/// Rays alone and in bundles; some bundles cross octants in the object's coordinates and not in the world's.
 #[test]
 fn extreme_placements() {
     use twincast::math::{DAffine3, DMat3, DQuat, DVec3};
@@ -245,7 +246,8 @@ fn degenerate_meshes() {
     assert_eq!(assert_parity(&scenes::of_mesh(Mesh::default()), &scenes::rays(100, &[Vec3::ONE], 1)), 0);
 }
 
-/// Faces that are there twice, turned and in another order; plates upon plates, along an axis and aslant; objects placed in one place: rays hit both at one t, and the lower id counts.
+/// Faces that are there twice, turned and in another order; plates upon plates, along an axis and aslant; objects
+/// placed in one place: rays hit both at one t, and the lower id counts.
 #[test]
 fn surfaces_that_lie_on_each_other() {
     let mut random = Random::new(21);
@@ -434,8 +436,8 @@ fn bundles() {
     }
 }
 
-/// Rays that run the same way, as an orthographic camera's and those towards the sun: through corners, edges and between, with ranges of all kinds and some
-/// that are not valid; near to each other, and far apart.
+/// Rays that run the same way, as an orthographic camera's and those towards the sun: through corners, edges and
+/// between, with ranges of all kinds and some that are not valid; near to each other, and far apart.
 #[test]
 fn parallel_rays() {
     let mut hits = 0;
@@ -452,7 +454,8 @@ fn parallel_rays() {
             let (back, apart) = (way * far, if k % 2 == 1 { 1e-4 } else { [0.01, 0.01, 0.01, 0.5, 0.01][k / 2] });
             let across = way.any_orthonormal_vector() * apart;
             let along = way.cross(across);
-            // Tiles of 8 x 8 around corners, lines through one corner as well as f32 can tell, and what does not fill a bundle.
+            // Tiles of 8 x 8 around corners, lines through one corner as well as f32 can tell, and what does not fill a
+            // bundle.
             let mut rays = Vec::new();
             for tile in 0..16 {
                 let middle = corners[random.below(corners.len())] - back;
@@ -481,7 +484,8 @@ fn parallel_rays() {
     assert!(hits > 3000, "{hits} hits");
 }
 
-/// What orthographic cameras see, and what of it the sun shines on: in tiles, from near and far, along axes, nearly along them and across, at all sizes, among placed objects and shapes.
+/// What orthographic cameras see, and what of it the sun shines on: in tiles, from near and far, along axes, nearly
+/// along them and across, at all sizes, among placed objects and shapes.
 #[test]
 fn parallel_bundles() {
     let floor = Mesh::new(
@@ -564,7 +568,8 @@ fn a_t_that_overflows_is_no_hit() {
     }
 }
 
-/// What lies behind a ray by a t that rounds to -0 is no hit, and ahead of it by one that rounds to 0 is one: alone, of one point, side by side.
+/// What lies behind a ray by a t that rounds to -0 is no hit, and ahead of it by one that rounds to 0 is one: alone, of
+/// one point, side by side.
 #[test]
 fn a_t_that_vanishes_keeps_its_side() {
     let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
@@ -593,7 +598,8 @@ fn products_that_overflow() {
         Mesh::new(corners, (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
     };
     let ahead = |z: f32, w: f32| [[-w, -w, z], [3.0 * w, -w, z], [-w, 3.0 * w, z]];
-    // Edges of 1e12 far up along a ray as steep as a bundle takes it, beside a triangle that makes the ray enter their leaf.
+    // Edges of 1e12 far up along a ray as steep as a bundle takes it, beside a triangle that makes the ray enter their
+    // leaf.
     let beyond = [[-1.7e18, -1.7e18, 1.7e18], [-1.7e18 + 1e12, -1.7e18, 1.7e18], [-1.7e18, -1.7e18 + 1e12, 1.7e18]];
     let steep = [[1.8e18, -1.8e18, 0.0], [1.8e18, 1.8e18, -1.8e18], [-1.8e18, -1.7e18, 1.8e18]];
     // As many as make a bundle, from the one to the other.
@@ -658,8 +664,8 @@ fn shadow_rays_from_far_away() {
     assert!(hits > 2000 && hits < rays.len(), "{hits} of {} hits", rays.len());
 }
 
-/// Numbers so small that they are multiples of the least: of boxes that are entered so soon none is left out, and of triangles in one
-/// place the first is hit.
+/// Numbers so small that they are multiples of the least: of boxes that are entered so soon none is left out, and of
+/// triangles in one place the first is hit.
 #[test]
 fn numbers_that_are_not_normal() {
     for scale in [0.01, 1e-5] {
@@ -730,8 +736,9 @@ fn shapes_that_only_the_rounded_ray_meets() {
     }
 }
 
-/// Bundles whose rays are farther apart than triangles are large, so that each leaf concerns a few of them; some aimed at corners and
-/// edges, some with ranges that begin or end at their hit, and shadow rays that start at corners. In the world and placed.
+/// Bundles whose rays are farther apart than triangles are large, so that each leaf concerns a few of them; some aimed
+/// at corners and edges, some with ranges that begin or end at their hit, and shadow rays that start at corners. In the
+/// world and placed.
 #[test]
 fn triangles_smaller_than_pixels() {
     // Squares, and with the last one distances from far away, leave f32.

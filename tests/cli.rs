@@ -37,7 +37,8 @@ fn help_names_every_command_and_flag() {
             if let Some(flag) = argument.get_long() {
                 assert!(help.contains(&format!("--{flag}")), "--{flag} in {help}");
             }
-            // What is chosen by name is offered, but for what the scene's file names, and for AOVs, which may be expressions.
+            // What is chosen by name is offered, but for what the scene's file names, and for AOVs, which may be
+            // expressions.
             let is_chosen = argument.get_value_names().is_some_and(|names| ["NAME", "NAME,..."].contains(&&*names[0]));
             if is_chosen && !["camera", "animation", "variant", "aov"].contains(&id) {
                 assert!(!argument.get_possible_values().is_empty(), "{name} {id}");
@@ -340,7 +341,8 @@ fn a_render_writes_pictures_and_statistics_and_says_so() {
     assert!(stats["engines"][0]["bytes_per_triangle"].as_f64().is_some_and(|x| x > 12.0), "{stats}");
 }
 
-/// Faces that a file holds twice, a floor upon a floor, and one group twice in one place: every ray that hits one hits another at the same t, and that is no reason to reckon exactly, whoever looks at the corners first.
+/// Faces that a file holds twice, a floor upon a floor, and one group twice in one place: every ray that hits one hits
+/// another at the same t, and that is no reason to reckon exactly, whoever looks at the corners first.
 #[test]
 fn surfaces_that_lie_on_each_other_ask_for_no_exact_decisions() {
     let folder = Folder::new();

@@ -1,6 +1,7 @@
 //! Denoising: what is said where there is no library, and where there is one, what becomes of pictures.
 //!
-//! Tests of the second kind leave off with a word on stderr where Open Image Denoise is not installed; `TWINCAST_OIDN` may name it.
+//! Tests of the second kind leave off with a word on stderr where Open Image Denoise is not installed; `TWINCAST_OIDN`
+//! may name it.
 
 use std::path::Path;
 use std::process::Output;

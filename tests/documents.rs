@@ -44,7 +44,8 @@ fn paths(value: &Value, at: &str, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Runs `command` of the page with other words for those in capitals, and compares what it prints with what is said of it; `elsewhere` are fields that other scenes have.
+/// Runs `command` of the page with other words for those in capitals, and compares what it prints with what is said of
+/// it; `elsewhere` are fields that other scenes have.
 fn check(command: &str, arguments: &[&str], elsewhere: &[&str]) {
     let page = page();
     let (_, told) = page.iter().find(|(name, _)| name == command).expect("a command of the page");
@@ -57,7 +58,8 @@ fn check(command: &str, arguments: &[&str], elsewhere: &[&str]) {
     paths(&value, "", &mut printed);
     let is_below = |path: &str, above: &str| path.strip_prefix(above).is_some_and(|rest| rest.starts_with(['.', '[']));
     for path in &printed {
-        // An object whose fields are told of needs no line of its own; of one that has a line and no others, that says all.
+        // An object whose fields are told of needs no line of its own; of one that has a line and no others, that says
+        // all.
         let is_told = told.contains(path)
             || told.iter().any(|other| is_below(other, path))
             || told.iter().any(|other| is_below(path, other) && !told.iter().any(|third| is_below(third, other)));

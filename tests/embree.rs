@@ -165,8 +165,8 @@ fn down(x: f32, y: f32) -> Ray {
     Ray::new(Vec3::new(x, y, 5.0), -Vec3::Z)
 }
 
-/// Whether a number of Embree's is the one that is expected. Where that divides it multiplies by an approximate reciprocal, which after a step of Newton's is off in the
-/// last place on some processors (AMD's without AVX-512).
+/// Whether a number of Embree's is the one that is expected. Where that divides it multiplies by an approximate
+/// reciprocal, which after a step of Newton's is off in the last place on some processors (AMD's without AVX-512).
 fn rounds_to(found: f32, expected: f32) -> bool {
     (found - expected).abs() <= 2.0 * f32::EPSILON * expected
 }
@@ -516,7 +516,8 @@ fn every_option_traces_the_same_scene_and_compact_takes_less_memory() {
     assert!(bytes(Options { compact: true, ..Options::default() }) < bytes(Options::default()));
 }
 
-/// A placement is a transform and its inverse at least, in f32, and a box in a tree of its own; of the first two Embree's memory monitor tells nothing.
+/// A placement is a transform and its inverse at least, in f32, and a box in a tree of its own; of the first two
+/// Embree's memory monitor tells nothing.
 #[test]
 fn placements_take_memory() {
     const PLACEMENTS: u32 = 100_000;

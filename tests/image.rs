@@ -114,7 +114,8 @@ fn only_codes_are_developed() {
     assert!(over_black.iter().zip([51, 26, 102]).all(|(&a, b): (&u8, u8)| a.abs_diff(b) <= 3), "{over_black:?}");
 }
 
-/// What a PNG says of its codes is what they are (PNG, third edition, sections 11.3.2.2 and 11.3.2.5): no sRGB where they are the light itself.
+/// What a PNG says of its codes is what they are (PNG, third edition, sections 11.3.2.2 and 11.3.2.5): no sRGB where
+/// they are the light itself.
 #[cfg(feature = "oiio")]
 #[test]
 fn codes_without_a_transfer_function_are_not_called_srgb() {
@@ -394,7 +395,8 @@ fn colours_of_openexr_are_told_by_name() {
     assert_eq!(image::read(&path).unwrap().pixels[0].to_array(), [1.0, 2.0, 3.0, 1.0]);
 }
 
-/// Radiance, *Radiance file formats*: the first axis of the line of sizes is the slower one, +Y upwards, +X to the right.
+/// Radiance, *Radiance file formats*: the first axis of the line of sizes is the slower one, +Y upwards, +X to the
+/// right.
 #[cfg(feature = "oiio")]
 #[test]
 fn the_line_of_sizes_of_radiance_says_how_a_picture_lies() {
@@ -430,7 +432,8 @@ fn jpeg_files_are_turned_as_exif_says() {
     write(&path, &image, Depth::Half);
     let plain = fs::read(&path).unwrap();
     let is_near = |a: f32, b: f32| (a - b).abs() < 0.1;
-    // Seen from the upper left corner: whether red, then green, is bright there; and whether width and height change places.
+    // Seen from the upper left corner: whether red, then green, is bright there; and whether width and height change
+    // places.
     for (orientation, red, green, turned) in [
         (1u8, true, true, false),
         (2, false, true, false),
@@ -453,7 +456,8 @@ fn jpeg_files_are_turned_as_exif_says() {
     }
 }
 
-/// An OpenEXR file of three columns and two rows, whose pixels are 1 to 6, with its origin and the x, y, width and height of the display window.
+/// An OpenEXR file of three columns and two rows, whose pixels are 1 to 6, with its origin and the x, y, width and
+/// height of the display window.
 fn exr_within(path: &Path, at: (i32, i32), (x, y, width, height): (i32, i32, usize, usize)) {
     use exr::prelude::*;
     let pixels = |at: Vec2<usize>| {

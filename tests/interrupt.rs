@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::program::{Running, command};
 
-/// Materials that no library has, each of which becomes a mesh: it takes seconds to read, and there is a warning when that is done.
+/// Materials that no library has, each of which becomes a mesh: it takes seconds to read, and there is a warning when
+/// that is done.
 const MATERIALS: usize = 400_000;
 
 /// It ends there and then, whoever reads: what is told of a scene once it is read, is not.

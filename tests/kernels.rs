@@ -1,7 +1,7 @@
 //! Whether kernels are compiled for the instruction sets that they are for, which no other test would notice.
 //!
-//! A closure or a function that is not inlined into a kernel is compiled for what every processor has, and then each of its vector
-//! instructions is a call of a function: among things that move, that once took half of all the time.
+//! A closure or a function that is not inlined into a kernel is compiled for what every processor has, and then each of
+//! its vector instructions is a call of a function: among things that move, that once took half of all the time.
 
 use std::process::{Command, Stdio};
 

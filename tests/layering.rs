@@ -1,10 +1,12 @@
-//! Holds the source to the layers of the architecture: imports only ever point down, and `unsafe` stays where it may be.
+//! Holds the source to the layers of the architecture: imports only ever point down, and `unsafe` stays where it may
+//! be.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The layers, from the bottom up. A module may use those in the layers below its own, and itself. `main` is the program.
+/// The layers, from the bottom up. A module may use those in the layers below its own, and itself. `main` is the
+/// program.
 const LAYERS: &[&[&str]] = &[
     &["error"],
     &["output", "memory", "once"],
@@ -114,7 +116,8 @@ fn heads(rest: &str) -> Vec<&str> {
     names
 }
 
-/// Every name directly below a module that `text` refers to, which stands in the module `path` from there on. `roots` are the module's own paths.
+/// Every name directly below a module that `text` refers to, which stands in the module `path` from there on. `roots`
+/// are the module's own paths.
 fn uses<'t>(text: &'t str, path: &[&str], roots: &[&str]) -> Vec<&'t str> {
     let mut found = Vec::new();
     for root in roots {

@@ -127,7 +127,8 @@ fn a_full_disk_keeps_the_old_picture() {
     }
 }
 
-/// A limit to the size of files holds in memory, too: what is cut off is found where it is read again, and the old picture stays.
+/// A limit to the size of files holds in memory, too: what is cut off is found where it is read again, and the old
+/// picture stays.
 #[test]
 fn writers_that_do_not_tell_what_goes_wrong_are_found_out() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -65,8 +65,8 @@ fn scenes_look_like_their_references() {
             if engine == "native" && std::env::var_os("TWINCAST_REFRESH").is_some() {
                 std::fs::copy(&written, &reference).expect("copied");
             }
-            // Both through 8 bits: native's picture is the same on every system, to the last of them. Embree's answer may
-            // be another on a tie or a boundary ray, one pixel in a thousand at the very most.
+            // Both through 8 bits: native's picture is the same on every system, to the last of them. Embree's answer
+            // may be another on a tie or a boundary ray, one pixel in a thousand at the very most.
             let [is, expected] = [&written, &reference].map(|path| image::read(path).expect("a picture"));
             let difference = is.difference(&expected).expect("of one size");
             let allowed = if engine == "native" { 0 } else { difference.pixels / 1000 };

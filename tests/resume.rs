@@ -61,7 +61,8 @@ fn a_render_that_is_killed_goes_on_to_the_same_file() {
     assert!(code == Some(3) && said.contains("no checkpoint to resume"), "{said}");
 }
 
-/// What a render is kept in takes the place of nothing else: neither of an output, nor of what the scene is read from, nor of a file that is no checkpoint.
+/// What a render is kept in takes the place of nothing else: neither of an output, nor of what the scene is read from,
+/// nor of a file that is no checkpoint.
 #[test]
 fn a_checkpoint_replaces_nothing_else() {
     let folder = tempfile::tempdir().unwrap();

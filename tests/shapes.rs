@@ -154,7 +154,8 @@ fn brute_force_is_the_oracle() {
     assert!(hits > 250 && ties < 2, "{hits} hits, {ties} ties");
 }
 
-/// Cylinders and cones are hit where a ray goes exactly through a rim, however far from, and missed a hair beyond it, as exact arithmetic has it.
+/// Cylinders and cones are hit where a ray goes exactly through a rim, however far from, and missed a hair beyond it,
+/// as exact arithmetic has it.
 #[test]
 fn rims_are_decided_exactly() {
     let mut random = Random::new(11);
@@ -171,7 +172,8 @@ fn rims_are_decided_exactly() {
             Shape::Cone(Cone::new(base, radius, apex, apex_radius, capped).expect("a cone"))
         };
         let rim = [base + side * radius, apex + side * apex_radius][case % 2];
-        // Steps on a grid, so that most rays pass the rim at t = 1 without rounding; a quarter goes past it by one step of f32.
+        // Steps on a grid, so that most rays pass the rim at t = 1 without rounding; a quarter goes past it by one step
+        // of f32.
         let way = eighths(&mut random) * 2f32.powi(random.below(16) as i32);
         let mut origin = rim - way;
         if case % 4 == 0 {

@@ -34,7 +34,8 @@ pub enum Error {
         /// What is wrong, and what would be right.
         message: String,
     },
-    /// A scene that no backend could take, with what is wrong and what would be right: an index past the vertices, a singular transform.
+    /// A scene that no backend could take, with what is wrong and what would be right: an index past the vertices, a
+    /// singular transform.
     #[error("scene: {0}")]
     Scene(String),
     /// A picture that there is not the memory for.

@@ -1,7 +1,7 @@
 //! The part of Twincast that no feature changes: scenes as data, the native tracer, shading, and the plan of a render.
 //!
-//! A crate by itself so that it is compiled once, whichever of Embree, OpenImageIO and Open Image Denoise a build has. The crate `twincast`
-//! has all of it under its own names, and is what programs use.
+//! A crate by itself so that it is compiled once, whichever of Embree, OpenImageIO and Open Image Denoise a build has.
+//! The crate `twincast` has all of it under its own names, and is what programs use.
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 

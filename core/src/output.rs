@@ -1,9 +1,10 @@
 //! Output files: all or nothing.
 //!
-//! A file is written beside its place under another name and renamed when it is whole, so that whoever reads it sees the
-//! old file or the new one, never half of one. The other name keeps the suffix, because image writers choose the format
-//! by it, and holds the process's number, so that two programs that write the same file do not write into each other's.
-//! Writing in place and restoring a backup on failure was rejected: it leaves half a file where the program is killed.
+//! A file is written beside its place under another name and renamed when it is whole, so that whoever reads it sees
+//! the old file or the new one, never half of one. The other name keeps the suffix, because image writers choose the
+//! format by it, and holds the process's number, so that two programs that write the same file do not write into each
+//! other's. Writing in place and restoring a backup on failure was rejected: it leaves half a file where the program is
+//! killed.
 
 use std::fs;
 use std::io;
@@ -37,7 +38,8 @@ pub fn write_passing(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Re
     files.commit().into_result()
 }
 
-/// Files that are put in place together, once the work is done. One that cannot be written does not cost the others. Devices and pipes are written to at once.
+/// Files that are put in place together, once the work is done. One that cannot be written does not cost the others.
+/// Devices and pipes are written to at once.
 #[derive(Default)]
 pub struct AtomicWrites {
     parts: Vec<Part>,

@@ -2,13 +2,16 @@
 
 use crate::math::Vec3;
 
-/// A half-line with a valid range. A hit counts if it is not behind the origin, and for `tmin <= t <= tmax`, t being rounded to f32.
+/// A half-line with a valid range. A hit counts if it is not behind the origin, and for `tmin <= t <= tmax`, t being
+/// rounded to f32.
 ///
-/// In memory in the order of the fields, so that what a tree is asked for, the first eight f32, is loaded as two vectors of four.
+/// In memory in the order of the fields, so that what a tree is asked for, the first eight f32, is loaded as two
+/// vectors of four.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Ray {
-    /// Start, in world coordinates (recentred scene units): [`World::ray`](crate::World::ray) makes rays of the scene's.
+    /// Start, in world coordinates (recentred scene units): [`World::ray`](crate::World::ray) makes rays of the
+    /// scene's.
     pub origin: Vec3,
     /// Direction; need not be a unit vector.
     pub direction: Vec3,
@@ -16,8 +19,8 @@ pub struct Ray {
     pub tmin: f32,
     /// Farthest valid t; may be infinite. A ray with `tmax < tmin` hits nothing.
     pub tmax: f32,
-    /// When it looks: from 0, where things start to move, to 1, where they end; a camera's shutter is open for a part of
-    /// it. Only scenes in which something moves heed it.
+    /// When it looks: from 0, where things start to move, to 1, where they end; a camera's shutter is open for a part
+    /// of it. Only scenes in which something moves heed it.
     pub time: f32,
 }
 
@@ -45,7 +48,8 @@ impl Ray {
             && self.tmin <= self.tmax
     }
 
-    /// Whether a hit at `t` counts: not behind the origin, however little, and within the range once it is rounded to f32.
+    /// Whether a hit at `t` counts: not behind the origin, however little, and within the range once it is rounded to
+    /// f32.
     #[inline]
     pub(crate) fn reaches(&self, t: f64) -> bool {
         let rounded = t as f32;
@@ -54,7 +58,8 @@ impl Ray {
     }
 }
 
-/// Where a ray met the scene: ids and parameters, nothing else. [`SurfacePoint::new`](crate::shade::SurfacePoint::new) computes the rest.
+/// Where a ray met the scene: ids and parameters, nothing else. [`SurfacePoint::new`](crate::shade::SurfacePoint::new)
+/// computes the rest.
 ///
 /// Six words in the order of the fields, so that the hits of a packet can be written as vectors.
 #[repr(C)]

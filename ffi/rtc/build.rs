@@ -1,4 +1,5 @@
-//! Gives the library the soname of the one that it stands in for, and says whether hits number the instances of an array.
+//! Gives the library the soname of the one that it stands in for, and says whether hits number the instances of an
+//! array.
 
 fn main() {
     let is_set = |feature: &str| std::env::var_os(format!("CARGO_FEATURE_{feature}")).is_some();

@@ -10,12 +10,13 @@ use crate::render::Aov;
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct AovArgs {
-    /// What OpenEXR outputs hold beside the colours: depth, position, normal, uv, primitive, geometry, instance, albedo,
-    /// samples, time, crypto-object, crypto-material, light by its paths, or all
+    /// What OpenEXR outputs hold beside the colours: depth, position, normal, uv, primitive, geometry, instance,
+    /// albedo, samples, time, crypto-object, crypto-material, light by its paths, or all
     ///
-    /// Light is that which came by certain paths: emission, direct, indirect (these three make up the picture), diffuse, specular,
-    /// transmission (with emission so do these); or as an expression: LDE was scattered once, diffusely, before it came to the eye;
-    /// caustics=L[ST]+DE gives it a name. D is diffuse, S reflected, T transmitted, . any of them; * + ? | ( ) [ ] as usual.
+    /// Light is that which came by certain paths: emission, direct, indirect (these three make up the picture),
+    /// diffuse, specular, transmission (with emission so do these); or as an expression: LDE was scattered once,
+    /// diffusely, before it came to the eye; caustics=L[ST]+DE gives it a name. D is diffuse, S reflected, T
+    /// transmitted, . any of them; * + ? | ( ) [ ] as usual.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = parse)]
     aov: Vec<Wanted>,
 }

@@ -19,11 +19,11 @@ use crate::trace::bvh::Isa;
 
 /// Measure builds and rays of native and Embree, in turn
 ///
-/// For each scene: builds (millions of triangles a second; bytes of trees and placements for each triangle) and rays (millions a
-/// second) of every engine and mode, ray by ray and in packets of 8 and 16, and for each kind of ray native's rate over
-/// Embree's, each at its best width: the median of the ratios within a turn. Rates move with whatever else the machine
-/// does; only these ratios can be compared between runs. The answers are compared as well: exit code 1 if native is
-/// wrong on a ray, textbooks' methods apart.
+/// For each scene: builds (millions of triangles a second; bytes of trees and placements for each triangle) and rays
+/// (millions a second) of every engine and mode, ray by ray and in packets of 8 and 16, and for each kind of ray
+/// native's rate over Embree's, each at its best width: the median of the ratios within a turn. Rates move with
+/// whatever else the machine does; only these ratios can be compared between runs. The answers are compared as well:
+/// exit code 1 if native is wrong on a ray, textbooks' methods apart.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -34,8 +34,8 @@ Examples:
   twincast bench bunny.obj --modes default --accel binary-bvh,grid,octree,kd-tree
   twincast bench --scaling --max 10000000 --chart scaling.svg")]
 pub(super) struct BenchArgs {
-    /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys), instances (or instancesN: N
-    /// placements of one mesh). All but terrains get a floor, two triangles that count
+    /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys),
+    /// instances (or instancesN: N placements of one mesh). All but terrains get a floor, two triangles that count
     #[arg(value_name = "SCENE", default_value = "terrain1000")]
     scenes: Vec<String>,
 
@@ -53,8 +53,8 @@ pub(super) struct BenchArgs {
     )]
     rays: Vec<Kind>,
 
-    /// Modes: native's default, native-fast, native-high, native-compact, native-fast-compact; Embree's fast, robust, compact, and high (quality,
-    /// fast otherwise)
+    /// Modes: native's default, native-fast, native-high, native-compact, native-fast-compact; Embree's fast, robust,
+    /// compact, and high (quality, fast otherwise)
     #[arg(
         long,
         value_name = "MODE,...",
@@ -87,8 +87,8 @@ pub(super) struct BenchArgs {
     #[command(flatten)]
     options: AccelOptionArgs,
 
-    /// Measure time against the number of triangles instead, for every accelerator: builds on --threads, rays on one. One that takes
-    /// over 10 seconds for a step is not asked for more
+    /// Measure time against the number of triangles instead, for every accelerator: builds on --threads, rays on one.
+    /// One that takes over 10 seconds for a step is not asked for more
     #[arg(long, conflicts_with_all = ["scenes", "up_axis", "rays", "modes", "size", "isa", "repeat", "accel", "grid", "triangle_method", "sphere_method"])]
     scaling: bool,
 
@@ -96,8 +96,8 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "N", requires = "scaling", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
     pub(super) max: Option<u64>,
 
-    /// Most memory that --scaling may hold, as in 8G or 500M (powers of 1024): accelerators that would take more are not asked
-    /// for more triangles (default: three quarters of what is free)
+    /// Most memory that --scaling may hold, as in 8G or 500M (powers of 1024): accelerators that would take more are
+    /// not asked for more triangles (default: three quarters of what is free)
     #[arg(long, value_name = "SIZE", requires = "scaling", value_parser = parse_bytes)]
     pub(super) max_memory: Option<u64>,
 
@@ -322,7 +322,8 @@ mod with_embree {
         Built { seconds, bytes: bvh.bytes(), sah_cost: Some(bvh.sah_cost()), tracer: Box::new(bvh) }
     }
 
-    /// Only what Embree itself does is charged to it, placements included as in native's trees: neither our copies of the triangles for it, nor their bytes.
+    /// Only what Embree itself does is charged to it, placements included as in native's trees: neither our copies of
+    /// the triangles for it, nor their bytes.
     fn build_embree(world: &World, options: &Options, costs: &TreeCosts) -> Result<Built> {
         let sah_cost = Some(costs.of(world, options)?);
         let embree = Embree::new(world, options)?;

@@ -28,7 +28,8 @@ pub(super) struct BuildArgs {
     #[arg(long, value_name = "PRESET", value_parser = presets(), default_value = AUTO)]
     build: OrAuto<Preset>,
 
-    /// Most memory to hold, as in 1.6G or 500M (powers of 1024); what would not fit is refused before it is built, PLY and binary STL before they are read
+    /// Most memory to hold, as in 1.6G or 500M (powers of 1024); what would not fit is refused before it is built, PLY
+    /// and binary STL before they are read
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     max_memory: Option<u64>,
 }
@@ -68,8 +69,8 @@ impl BuildArgs {
         self.decide(backend, promised.triangles, Rays::default(), promised.bytes).map(drop)
     }
 
-    /// How to build the native tree over so many triangles, for so many rays, beside a picture of so many pixels with these channels; none where only
-    /// Embree renders.
+    /// How to build the native tree over so many triangles, for so many rays, beside a picture of so many pixels with
+    /// these channels; none where only Embree renders.
     ///
     /// # Errors
     /// [`Error::Backend`] where there is not the memory for it.
@@ -89,8 +90,8 @@ impl BuildArgs {
     /// The same, with so many bytes still to come beside the tree.
     fn decide(&self, backend: BackendArg, triangles: u64, rays: Rays, to_come: u64) -> Result<Option<BuildChoice>> {
         if self.max_memory.is_some() {
-            // A render holds OpenImageIO's libraries sooner or later, and may be loading them just now. Where that fails, whoever wants a
-            // picture says so.
+            // A render holds OpenImageIO's libraries sooner or later, and may be loading them just now. Where that
+            // fails, whoever wants a picture says so.
             let _ = image::prepare();
         }
         let embree = if backend == BackendArg::Native { 0 } else { triangles.saturating_mul(EMBREE_BYTES) };

@@ -18,9 +18,9 @@ use crate::trace::bvh::{Bvh, Cache, CacheReport, CacheUse, Options};
 pub(super) struct CacheArgs {
     /// Folder where built native trees are kept, to be read the next time; never changes a picture
     ///
-    /// It is made if it is missing. The trees of all triangles of a scene are one file for each --build, which is checked against them before it is
-    /// used: one that is damaged or foreign is named, ignored and rewritten. Files must not be changed while in use, and
-    /// may be deleted at any other time.
+    /// It is made if it is missing. The trees of all triangles of a scene are one file for each --build, which is
+    /// checked against them before it is used: one that is damaged or foreign is named, ignored and rewritten. Files
+    /// must not be changed while in use, and may be deleted at any other time.
     #[arg(long = "cache", value_name = "DIR")]
     folder: Option<PathBuf>,
 }

@@ -21,7 +21,8 @@ pub(crate) struct CameraArgs {
         "projection", "height"])]
     camera: Option<String>,
 
-    /// Position, in metres with +y up, as --unit and --up-axis leave the scene; the flags from --look-at to --height go with it
+    /// Position, in metres with +y up, as --unit and --up-axis leave the scene; the flags from --look-at to --height go
+    /// with it
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     eye: Option<DVec3>,
 

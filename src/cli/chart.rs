@@ -14,7 +14,8 @@ use crate::lab::chart::{Chart, Figure, Setup, page};
 
 /// Chart speed against accuracy: methods, engines, samplers, filters
 ///
-/// Writes each chart as SVG and PNG with its numbers as CSV, and a page (index.html) that shows them all with how they were made.
+/// Writes each chart as SVG and PNG with its numbers as CSV, and a page (index.html) that shows them all with how they
+/// were made.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -14,13 +14,14 @@ use crate::render::{Checkpoint, is_checkpoint};
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct CheckpointArgs {
-    /// Write what is done so far this often (90s, 5m, 1h), but a fifth of the time at most, and on Ctrl-C and SIGTERM, beside the output: picture.png
-    /// has picture.checkpoint.exr, which any viewer of OpenEXR shows; it is removed when the picture is written
+    /// Write what is done so far this often (90s, 5m, 1h), but a fifth of the time at most, and on Ctrl-C and SIGTERM,
+    /// beside the output: picture.png has picture.checkpoint.exr, which any viewer of OpenEXR shows; it is removed when
+    /// the picture is written
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     checkpoint: Option<Duration>,
 
-    /// Go on from that file, to the same bits; an error where it is missing, or of another scene, settings or program. With --frames
-    /// the frames that have none begin anew
+    /// Go on from that file, to the same bits; an error where it is missing, or of another scene, settings or program.
+    /// With --frames the frames that have none begin anew
     #[arg(long)]
     resume: bool,
 }
@@ -46,10 +47,11 @@ impl CheckpointArgs {
     /// How the render of these pictures is kept; none where it is not. Checked before any work.
     ///
     /// # Errors
-    /// [`Error::Usage`] where there is no picture or more than one engine, [`Error::Input`] where there is nothing to resume, and
-    /// [`Error::Output`] where the file cannot be written.
+    /// [`Error::Usage`] where there is no picture or more than one engine, [`Error::Input`] where there is nothing to
+    /// resume, and [`Error::Output`] where the file cannot be written.
     ///
-    /// Its file must be none of the run's other ones: of the outputs, of which pictures are the first, nor of what is read.
+    /// Its file must be none of the run's other ones: of the outputs, of which pictures are the first, nor of what is
+    /// read.
     pub(super) fn open(
         &self,
         pictures: &[PathBuf],

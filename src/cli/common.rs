@@ -33,7 +33,8 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "KIND", value_parser = normals(), default_value = Normals::default().name())]
     normals: Normals,
 
-    /// Seconds from the start of an animation, for the pose that things have then; glTF (default: the pose that the file stores; 0 with --animation)
+    /// Seconds from the start of an animation, for the pose that things have then; glTF (default: the pose that the
+    /// file stores; 0 with --animation)
     #[arg(long, value_name = "SECONDS", value_parser = parse_time)]
     pub(crate) time: Option<f64>,
 
@@ -46,7 +47,8 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = parse_fps)]
     pub(crate) fps: f64,
 
-    /// Which of the sets of materials that the file offers, by its name; glTF (default: those that things have by themselves)
+    /// Which of the sets of materials that the file offers, by its name; glTF (default: those that things have by
+    /// themselves)
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
 }
@@ -76,8 +78,8 @@ fn normals() -> impl TypedValueParser<Value = Normals> {
     })
 }
 
-/// An error where a flag is given, but not the one that it goes with. The parser of the command line says so itself unless that one
-/// would be in the way of a third.
+/// An error where a flag is given, but not the one that it goes with. The parser of the command line says so itself
+/// unless that one would be in the way of a third.
 pub(crate) fn needs((flag, is_given): (&str, bool), (other, is_there): (&str, bool)) -> Result<()> {
     if is_given && !is_there {
         return Err(Error::Usage(format!("{flag} goes with {other}; add that, or leave it out")));

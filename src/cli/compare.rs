@@ -18,9 +18,9 @@ use crate::scene::{Camera, MAX_SPP, Scene};
 
 /// Compare native with Embree on every ray of a picture and on difficult rays
 ///
-/// Where they differ, exact arithmetic decides: agree, tie (two primitives at an equal t), boundary (within f32 rounding
-/// of an edge, a silhouette or an end of the ray's range), native_wrong, embree_wrong. Under 20,000 primitives brute
-/// force is asked as well. Exit code 1 if native is wrong anywhere, or if a pixel differs and no ray explains it.
+/// Where they differ, exact arithmetic decides: agree, tie (two primitives at an equal t), boundary (within f32
+/// rounding of an edge, a silhouette or an end of the ray's range), native_wrong, embree_wrong. Under 20,000 primitives
+/// brute force is asked as well. Exit code 1 if native is wrong anywhere, or if a pixel differs and no ray explains it.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -58,8 +58,8 @@ pub(super) struct CompareArgs {
     #[command(flatten)]
     accel: AccelArgs,
 
-    /// Hold every accelerator, and Embree where it is built, against brute force, on as many of the rays as that has time for; exit
-    /// code 1 if any of this program's own differs on one, with textbooks' methods in what it names
+    /// Hold every accelerator, and Embree where it is built, against brute force, on as many of the rays as that has
+    /// time for; exit code 1 if any of this program's own differs on one, with textbooks' methods in what it names
     #[arg(long, conflicts_with_all = ["accel", "diff", "folder", "spp"])]
     all: bool,
 

@@ -1,7 +1,8 @@
-//! Taking the noise out of a picture that is done: the flag, what it asks of the render, and what becomes of the picture.
+//! Taking the noise out of a picture that is done: the flag, what it asks of the render, and what becomes of the
+//! picture.
 //!
-//! The network's guides, albedo and normals, are taken down with the picture's own samples, as AOVs; the render and what it keeps
-//! in checkpoints are those of these AOVs. Files have them only where they were asked for.
+//! The network's guides, albedo and normals, are taken down with the picture's own samples, as AOVs; the render and
+//! what it keeps in checkpoints are those of these AOVs. Files have them only where they were asked for.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -29,7 +30,8 @@ const WHOLE: u64 = 1000;
 #[derive(Clone, Debug, Args)]
 pub(super) struct DenoiseArgs {
     /// Take the noise out of the finished picture, with Intel's Open Image Denoise where that is installed (or where
-    /// the environment variable TWINCAST_OIDN names it); with --aov, OpenEXR outputs keep the picture as it was in a layer "noisy"
+    /// the environment variable TWINCAST_OIDN names it); with --aov, OpenEXR outputs keep the picture as it was in a
+    /// layer "noisy"
     #[arg(long, conflicts_with = "pixel")]
     denoise: bool,
 }
@@ -53,7 +55,8 @@ impl DenoiseArgs {
     /// Finds the library, before any work, for a render that is to tell `wanted`; none where nothing is to be denoised.
     ///
     /// # Errors
-    /// [`Error::Unavailable`] where there is no library, [`Error::Usage`] where a kind of light has the name of a layer of ours.
+    /// [`Error::Unavailable`] where there is no library, [`Error::Usage`] where a kind of light has the name of a layer
+    /// of ours.
     pub(super) fn open(&self, wanted: &[Aov]) -> Result<Option<Denoising>> {
         if !self.denoise {
             return Ok(None);

@@ -1,7 +1,9 @@
-//! A picture in the making, in the viewer tev (T. Müller's, by its protocol: packets over TCP, as its `src/Ipc.cpp` has them).
+//! A picture in the making, in the viewer tev (T. Müller's, by its protocol: packets over TCP, as its `src/Ipc.cpp` has
+//! them).
 //!
-//! Packets are sent by a thread of their own, so that a slow viewer does not hold up the render. What waits to be sent is at most the picture, one of each engine: of a
-//! tile that is done again before it was sent, the newest packet. A viewer that goes away during the render is told of at the end, and costs the picture nothing.
+//! Packets are sent by a thread of their own, so that a slow viewer does not hold up the render. What waits to be sent
+//! is at most the picture, one of each engine: of a tile that is done again before it was sent, the newest packet. A
+//! viewer that goes away during the render is told of at the end, and costs the picture nothing.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -224,7 +226,8 @@ mod tests {
         assert_eq!(packet.finished(), bytes.concat());
     }
 
-    /// What comes again before it was sent takes the place of what came before; an image comes before its tiles, and before the next.
+    /// What comes again before it was sent takes the place of what came before; an image comes before its tiles, and
+    /// before the next.
     #[test]
     fn the_newest_of_each_tile_waits() {
         let queue = Queue::default();

@@ -1,7 +1,8 @@
 //! Many frames of an animation in one run: a picture each, under numbered names.
 //!
-//! Every frame is a whole run of its own, from reading the file on: meshes that are deformed have another shape in each, and no frame
-//! depends on those before it. Pictures appear when they are finished, so those that are there need no second rendering.
+//! Every frame is a whole run of its own, from reading the file on: meshes that are deformed have another shape in
+//! each, and no frame depends on those before it. Pictures appear when they are finished, so those that are there need
+//! no second rendering.
 
 use std::path::{Path, PathBuf};
 
@@ -14,8 +15,8 @@ use crate::error::{Error, Result};
 /// Which frames.
 #[derive(Clone, Debug, Args)]
 pub(super) struct FrameArgs {
-    /// Render frames A to B of an animation: frame N is what is to be seen N / --fps seconds from its start, and %04d in names of
-    /// outputs stands for N
+    /// Render frames A to B of an animation: frame N is what is to be seen N / --fps seconds from its start, and %04d
+    /// in names of outputs stands for N
     #[arg(long, value_name = "A-B", value_parser = parse_frames, conflicts_with_all = ["time", "print_camera"], requires = "output")]
     frames: Option<[u32; 2]>,
 

@@ -1,4 +1,5 @@
-//! Ctrl-C, and SIGTERM, which schedulers of batches send: stop cleanly at the first, at once at the second, and at the first where nothing has begun that could be left half done.
+//! Ctrl-C, and SIGTERM, which schedulers of batches send: stop cleanly at the first, at once at the second, and at the
+//! first where nothing has begun that could be left half done.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,7 +19,8 @@ static HARMLESS: AtomicBool = AtomicBool::new(false);
 /// Whether it is being tried to write pictures.
 static TRYING: AtomicBool = AtomicBool::new(false);
 
-/// Has Ctrl-C set the flag that is returned, and a second one end the process with exit code 130. May be asked for again.
+/// Has Ctrl-C set the flag that is returned, and a second one end the process with exit code 130. May be asked for
+/// again.
 pub(super) fn install() -> Result<&'static AtomicBool> {
     if INSTALLED.swap(true, Ordering::Relaxed) {
         return Ok(&STOP);

@@ -1,4 +1,5 @@
-//! The command line: a file for each subcommand, for each group of flags that several of them take, and for what they need to do their work.
+//! The command line: a file for each subcommand, for each group of flags that several of them take, and for what they
+//! need to do their work.
 //!
 //! Arguments go in, the library does the work, an exit code comes out. Completions and the manual are made from the
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
@@ -131,7 +132,8 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             let printed = error.print().and_then(|()| std::io::stdout().flush());
             return match printed {
-                // What was asked for, help or a version, and could not be told. Where stderr is closed, nobody is left to be told of that.
+                // What was asked for, help or a version, and could not be told. Where stderr is closed, nobody is left
+                // to be told of that.
                 Err(failed) if !error.use_stderr() && failed.kind() != ErrorKind::BrokenPipe => {
                     let failed = Error::output("<stdout>", failed.to_string());
                     complain("error", &failed);

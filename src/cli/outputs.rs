@@ -51,7 +51,8 @@ pub(super) fn check_places<'a>(
     others.into_iter().try_for_each(|path| output::check_writable(path))
 }
 
-/// Whether the outputs leave alone the files that a scene was read from, textures and all, which are known once it is there.
+/// Whether the outputs leave alone the files that a scene was read from, textures and all, which are known once it is
+/// there.
 pub(super) fn spare<'a>(outputs: impl IntoIterator<Item = &'a PathBuf>, files: &[PathBuf]) -> Result<()> {
     let files: HashSet<PathBuf> = files.iter().map(|file| place(file)).collect();
     match outputs.into_iter().find(|path| files.contains(&place(path))) {
@@ -88,7 +89,8 @@ pub(super) fn commit(files: AtomicWrites) -> Result<()> {
     Err(first)
 }
 
-/// Writes one picture to each path, in the format its suffix says, with the channels where that holds any; to be put in place with `files`.
+/// Writes one picture to each path, in the format its suffix says, with the channels where that holds any; to be put in
+/// place with `files`.
 pub(super) fn write_pictures(
     files: &mut AtomicWrites,
     paths: &[PathBuf],

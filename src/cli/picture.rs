@@ -18,7 +18,8 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "WxH")]
     size: Option<Size>,
 
-    /// Render this part alone: columns and rows to its left and above it, and its size; the same pixels as in the whole picture
+    /// Render this part alone: columns and rows to its left and above it, and its size; the same pixels as in the whole
+    /// picture
     #[arg(long, value_name = "X,Y,WxH", value_parser = parse_crop, allow_hyphen_values = true)]
     crop: Option<Crop>,
 
@@ -26,8 +27,9 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SPP)))]
     spp: Option<u32>,
 
-    /// Take samples where they are needed: until the error of the pixels that are noisy is this, root mean square, as a screen shows it, 1
-    /// being white (0.01 is about 2 of 255); no pixel has fewer than --spp and 16, nor more than --max-spp
+    /// Take samples where they are needed: until the error of the pixels that are noisy is this, root mean square, as a
+    /// screen shows it, 1 being white (0.01 is about 2 of 255); no pixel has fewer than --spp and 16, nor more
+    /// than --max-spp
     #[arg(long, value_name = "X", value_parser = parse_noise)]
     noise: Option<f32>,
 
@@ -39,7 +41,8 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "NAME", value_parser = integrators())]
     integrator: Option<OrAuto<Integrator>>,
 
-    /// How often a ray may be sent on; what it would see after that is black (default: the scene's, else 5, for paths 64)
+    /// How often a ray may be sent on; what it would see after that is black (default: the scene's, else 5, for
+    /// paths 64)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_DEPTH)))]
     max_depth: Option<u32>,
 

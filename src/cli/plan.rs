@@ -23,8 +23,8 @@ use crate::trace::accel::Accel;
 /// How much is modelled.
 #[derive(Clone, Debug, Args)]
 pub(super) struct PlanArgs {
-    /// What is modelled: no more than the scene needs, all of it (full), or named parts of what it does not need, so that what leaving them out
-    /// saves can be told
+    /// What is modelled: no more than the scene needs, all of it (full), or named parts of what it does not need, so
+    /// that what leaving them out saves can be told
     #[arg(long = "plan", value_name = "NAME,...", value_parser = parts(), value_delimiter = ',', default_value = NEEDED)]
     plan: Vec<Complete>,
 }
@@ -55,8 +55,8 @@ impl PlanArgs {
 
 /// Say what a render of a scene would do: no more than the scene needs
 ///
-/// Counts what is in the scene, and says what follows: accelerator, how well its tree is built, levels, integrator, lights, what is
-/// computed at each hit, how many rays there will be, and what of the complete model is left out.
+/// Counts what is in the scene, and says what follows: accelerator, how well its tree is built, levels, integrator,
+/// lights, what is computed at each hit, how many rays there will be, and what of the complete model is left out.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -83,7 +83,8 @@ pub(super) struct PlanCommand {
     #[command(flatten)]
     light: LightArgs,
 
-    /// Measure what leaving each thing out saves, by the native BVH: renders with it and without, in turn, so often each
+    /// Measure what leaving each thing out saves, by the native BVH: renders with it and without, in turn, so often
+    /// each
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     measure: Option<u32>,
 

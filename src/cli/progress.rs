@@ -5,12 +5,14 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// A bar over so many pixels, bytes or whatever `what` counts; invisible where `quiet` or where stderr is not a terminal.
+/// A bar over so many pixels, bytes or whatever `what` counts; invisible where `quiet` or where stderr is not a
+/// terminal.
 pub(super) fn bar(count: u64, what: &str, quiet: bool) -> ProgressBar {
     show(Some(count), "{msg} [{bar:40}] {percent:>3} %, {elapsed} of {duration}", what, quiet)
 }
 
-/// The time that something takes whose end is not known, in the place of a bar: builds by Embree, and by accelerators that do not tell.
+/// The time that something takes whose end is not known, in the place of a bar: builds by Embree, and by accelerators
+/// that do not tell.
 pub(super) fn spinner(what: &str, quiet: bool) -> ProgressBar {
     show(None, "{msg} {spinner} {elapsed}", what, quiet)
 }

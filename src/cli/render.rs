@@ -84,7 +84,8 @@ pub(super) struct RenderArgs {
     #[arg(long)]
     pub(super) print_camera: bool,
 
-    /// Picture of the same size to compare with, as its format would hold this one; exit code 1 if they differ by more than --threshold
+    /// Picture of the same size to compare with, as its format would hold this one; exit code 1 if they differ by more
+    /// than --threshold
     #[arg(long, value_name = "FILE", requires = "output")]
     pub(super) reference: Option<PathBuf>,
 
@@ -158,7 +159,8 @@ fn render(args: &RenderArgs) -> Result<()> {
     }
     outputs::check_places(&args.output, &args.stats, &args.inputs())?;
     let pool = pool(args.threads)?;
-    // Starting a thread takes the dynamic loader's lock, which is held as long as a library is being loaded: so all threads are started, and have what ends with them, before the trial loads any.
+    // Starting a thread takes the dynamic loader's lock, which is held as long as a library is being loaded: so all
+    // threads are started, and have what ends with them, before the trial loads any.
     pool.broadcast(|_| prepare_thread());
     let trial = Trial::start(args.output.clone(), cancel)?;
     trial.join(produce(args, &pool, cancel))
@@ -236,7 +238,8 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
 }
 
 impl RenderArgs {
-    /// How well the native tree is worth building for this render; none where another accelerator was named, whose choice it is.
+    /// How well the native tree is worth building for this render; none where another accelerator was named, whose
+    /// choice it is.
     fn choose_build(&self, request: &RenderRequest, renderer: &Renderer<'_>) -> Result<Option<BuildChoice>> {
         if request.accel.0 != Accel::Bvh {
             return Ok(None);

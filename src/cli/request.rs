@@ -1,4 +1,5 @@
-//! What is to be rendered: what the flags of `render` say, and the scene that they name. Everything that can be refused before the work is refused here.
+//! What is to be rendered: what the flags of `render` say, and the scene that they name. Everything that can be refused
+//! before the work is refused here.
 
 use std::iter;
 use std::path::{Path, PathBuf};

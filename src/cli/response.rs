@@ -62,7 +62,8 @@ pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
     Some(format!("{share} % of what is seen {message}; --exposure {exposure} would show it"))
 }
 
-/// Where there is light that f32 cannot hold: of how many pixels, and of which first, by its place in the whole picture, of which `window` was rendered.
+/// Where there is light that f32 cannot hold: of how many pixels, and of which first, by its place in the whole
+/// picture, of which `window` was rendered.
 pub(super) fn beyond_numbers(image: &Image, window: &Crop) -> Option<String> {
     let is_beyond = |pixel: &Vec4| !pixel.is_finite();
     let first = image.pixels.iter().position(is_beyond)?;

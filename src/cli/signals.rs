@@ -7,8 +7,8 @@ pub(super) fn have_termination_interrupt() {
     unsafe { libc::signal(libc::SIGTERM, on_termination as *const () as libc::sighandler_t) };
 }
 
-/// Has the process end with a message and exit code 3 where a file that is mapped is cut short under it: of what lies beyond its end there is nothing to give, and no
-/// read that could fail.
+/// Has the process end with a message and exit code 3 where a file that is mapped is cut short under it: of what lies
+/// beyond its end there is nothing to give, and no read that could fail.
 pub(super) fn tell_of_missing_pages() {
     // SAFETY: as above, and the structure's other fields are good as zeros.
     unsafe {
@@ -27,7 +27,8 @@ extern "C" fn on_termination(_signal: libc::c_int) {
 extern "C" fn on_missing_page(signal: libc::c_int, info: *const libc::siginfo_t, _context: *const libc::c_void) {
     const MESSAGE: &str =
         "error: a file became shorter while it was read; wait until it is written, and run this again\n";
-    // SAFETY: all of these may be called in a handler; the text is constant, and the system gives what the signal is about.
+    // SAFETY: all of these may be called in a handler; the text is constant, and the system gives what the signal is
+    // about.
     unsafe {
         if (*info).si_code != libc::BUS_ADRERR {
             // Memory that failed: by the signal, once the handler returns to where it happened.

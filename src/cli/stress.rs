@@ -23,8 +23,8 @@ const MATRIX: [&str; 3] = ["matrix.json", "matrix.svg", "failing.txt"];
 /// Run every method on the cases on which ray casters are known to fail
 ///
 /// Exact arithmetic answers every ray, and the native tracer in all its forms, the classic accelerators, the textbooks'
-/// methods and Embree are held against that. What is known to fail is on record. Exit code 1 if anything exact fails, or
-/// if something does not fail as it is on record (with the usual number of rays and seed).
+/// methods and Embree are held against that. What is known to fail is on record. Exit code 1 if anything exact fails,
+/// or if something does not fail as it is on record (with the usual number of rays and seed).
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -55,11 +55,13 @@ pub(super) struct StressArgs {
     #[arg(long, value_name = "N", default_value_t = Setup::SEED)]
     seed: u64,
 
-    /// Share the rays out among the forms of a method (builds, instruction sets, packets), instead of asking each form all of them
+    /// Share the rays out among the forms of a method (builds, instruction sets, packets), instead of asking each form
+    /// all of them
     #[arg(long)]
     in_turns: bool,
 
-    /// Look for new cases for so long: change rays and triangles towards where f32 fails, and ask the methods there (default: native)
+    /// Look for new cases for so long: change rays and triangles towards where f32 fails, and ask the methods there
+    /// (default: native)
     #[arg(long, value_name = "SECONDS", conflicts_with_all = ["cases", "rays", "in_turns"], value_parser = clap::value_parser!(u64).range(1..))]
     search: Option<u64>,
 

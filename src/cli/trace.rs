@@ -23,8 +23,9 @@ use crate::trace::{Tracer, World};
 
 /// Say what every engine makes of one ray, to the last bit
 ///
-/// The scene is a file, a case of `twincast stress` (case:edge-leak/6) or a case file. Numbers are decimal or hexadecimal
-/// (0x1.8p+1); the ray is in the coordinates that are traced: those of the scene less its centre, which is named where it is not zero.
+/// The scene is a file, a case of `twincast stress` (case:edge-leak/6) or a case file. Numbers are decimal or
+/// hexadecimal (0x1.8p+1); the ray is in the coordinates that are traced: those of the scene less its centre, which is
+/// named where it is not zero.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -1,7 +1,8 @@
 //! Whether pictures can be written, found out while other work goes on.
 //!
-//! Only a picture is proof, and the first takes a quarter of a second, in which OpenImageIO's libraries are loaded. So it is made on a thread of its own, beside
-//! the reading of the scene. What is wrong is told as if it had been found before.
+//! Only a picture is proof, and the first takes a quarter of a second, in which OpenImageIO's libraries are loaded. So
+//! it is made on a thread of its own, beside the reading of the scene. What is wrong is told as if it had been found
+//! before.
 
 use std::panic::resume_unwind;
 use std::path::PathBuf;

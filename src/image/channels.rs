@@ -1,8 +1,8 @@
 //! What a file holds for each pixel beside its colour: depth, names, light by where it was scattered.
 //!
 //! Only OpenEXR has room for it. The channels stand in one part beside R, G, B and A, under names whose layer comes
-//! before a dot (`normal.X`), as compositors expect. One part a layer, the alternative, packs names apart from colours, but
-//! fewer programs read files of several parts.
+//! before a dot (`normal.X`), as compositors expect. One part a layer, the alternative, packs names apart from colours,
+//! but fewer programs read files of several parts.
 
 use crate::error::{Error, Result};
 

@@ -1,6 +1,7 @@
 //! Writing and reading image files, whichever backend does it.
 //!
-//! OpenImageIO is loaded by the first of these functions that needs it. Where it cannot be, [`Error::Unavailable`] says so.
+//! OpenImageIO is loaded by the first of these functions that needs it. Where it cannot be, [`Error::Unavailable`] says
+//! so.
 
 use std::path::Path;
 
@@ -50,7 +51,8 @@ pub(super) struct Encoding {
     pub alpha: bool,
     /// Edge of a tile; 0 for rows, as most formats have them.
     pub tile: u32,
-    /// Whether codes are the light itself, without a transfer function. The writers of builds without OpenImageIO say nothing of it.
+    /// Whether codes are the light itself, without a transfer function. The writers of builds without OpenImageIO say
+    /// nothing of it.
     #[cfg_attr(not(feature = "oiio"), expect(dead_code))]
     pub linear: bool,
 }
@@ -61,8 +63,8 @@ const MAX_HALF: f32 = 65504.0;
 /// What is written with and without OpenImageIO.
 pub(super) const COMMON: [Format; 3] = [Format::OpenExr, Format::Jpeg, Format::Png];
 
-/// The most pixels along a side that a format holds. Those without a number hold all pictures that are rendered, or find out themselves.
-/// Checked here because some users of libjpeg end the process where its limit is exceeded.
+/// The most pixels along a side that a format holds. Those without a number hold all pictures that are rendered, or
+/// find out themselves. Checked here because some users of libjpeg end the process where its limit is exceeded.
 fn longest_side(format: Format) -> Option<u32> {
     match format {
         Format::Jpeg => Some(65_500),
@@ -90,7 +92,8 @@ const PIXELS_PER_BYTE: u64 = 1 << 14;
 ///
 /// # Errors
 /// [`Error::Output`] for a suffix that this build does not write, and for whatever goes wrong with the file;
-/// [`Error::Usage`] for an image without pixels or with too few, for tiles of size 0, and for what [`Metadata::texts`] cannot be.
+/// [`Error::Usage`] for an image without pixels or with too few, for tiles of size 0, and for what [`Metadata::texts`]
+/// cannot be.
 pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<()> {
     write_channels(path, image, &[], metadata, options)
 }
@@ -98,8 +101,8 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOpt
 /// As [`write()`], with further channels beside the colours, which keep all their bits.
 ///
 /// # Errors
-/// Those of [`write()`]; [`Error::Output`] where there are channels and the format is not OpenEXR, and [`Error::Usage`] where they do
-/// not go with the image, or with each other.
+/// Those of [`write()`]; [`Error::Output`] where there are channels and the format is not OpenEXR, and [`Error::Usage`]
+/// where they do not go with the image, or with each other.
 pub fn write_channels(
     path: &Path,
     image: &Image,
@@ -194,9 +197,9 @@ pub fn check_writable(path: &Path) -> Result<()> {
     output::probe(path, |part| write_part(path, part, &image, &[], coding, &metadata))
 }
 
-/// Reads an image as it is to be seen. Integer samples are taken for sRGB and linearised, floating samples are taken as they are; gray is
-/// spread over R, G and B, and missing alpha is 1. Of files with several images or layers, the first is read; of OpenEXR the channels
-/// R, G and B, or Y, and A.
+/// Reads an image as it is to be seen. Integer samples are taken for sRGB and linearised, floating samples are taken as
+/// they are; gray is spread over R, G and B, and missing alpha is 1. Of files with several images or layers, the first
+/// is read; of OpenEXR the channels R, G and B, or Y, and A.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that is missing, broken or in a format that this build does not read, and for one that
@@ -205,7 +208,8 @@ pub fn read(path: &Path) -> Result<Image> {
     read_samples(path).map(samples::decode)
 }
 
-/// As [`read`], but the whole picture where an OpenEXR file holds a part of it: transparent black around that, and nothing of what lies beyond.
+/// As [`read`], but the whole picture where an OpenEXR file holds a part of it: transparent black around that, and
+/// nothing of what lies beyond.
 ///
 /// # Errors
 /// Those of [`read`].

@@ -1,7 +1,7 @@
 //! Formats of pictures, which the suffixes of files tell apart.
 //!
-//! What is to be known of a format stands where it is needed: what a file of it holds in `file.rs`, how it is told by its first bytes in
-//! `oiio/formats.rs`.
+//! What is to be known of a format stands where it is needed: what a file of it holds in `file.rs`, how it is told by
+//! its first bytes in `oiio/formats.rs`.
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
-//! What JPEG files are asked before a decoder gets to see them: whether they are cut short, and what is not the picture.
+//! What JPEG files are asked before a decoder gets to see them: whether they are cut short, and what is not the
+//! picture.
 //!
 //! Of what is missing decoders say nothing and fill it up with grey, or say it where nobody looks.
 
@@ -12,12 +13,14 @@ const SCAN: u8 = 0xda;
 /// Ends the picture. It is not among compressed bytes, where a zero follows each 0xff.
 const END: [u8; 2] = [0xff, 0xd9];
 
-/// Whether these are the bytes of a JPEG file that has rows and no end. What comes after the end, such as a phone's film, does not matter.
+/// Whether these are the bytes of a JPEG file that has rows and no end. What comes after the end, such as a phone's
+/// film, does not matter.
 pub(crate) fn is_cut_short(bytes: &[u8]) -> bool {
     rows(bytes).is_some_and(|rows| memchr::memmem::find(rows, &END).is_none())
 }
 
-/// From the first rows on, after all segments before them, of which one may hold a thumbnail with rows and an end of its own. None where there are none.
+/// From the first rows on, after all segments before them, of which one may hold a thumbnail with rows and an end of
+/// its own. None where there are none.
 fn rows(bytes: &[u8]) -> Option<&[u8]> {
     let mut rest = bytes.strip_prefix(&START)?;
     loop {

@@ -6,9 +6,10 @@ use std::path::Path;
 
 use libloading::os::unix::{Library, RTLD_LOCAL};
 
-/// Opens a library, by its path or by a name that the system looks for; else says why it cannot be loaded, in the loader's words, which mostly begin with
-/// a library's name: this one's, or that of one it needs. What it calls in others is looked up now (`RTLD_NOW`), or as it is called first (`RTLD_LAZY`), which is
-/// how programs are linked and takes less time.
+/// Opens a library, by its path or by a name that the system looks for; else says why it cannot be loaded, in the
+/// loader's words, which mostly begin with a library's name: this one's, or that of one it needs. What it calls in
+/// others is looked up now (`RTLD_NOW`), or as it is called first (`RTLD_LAZY`), which is how programs are linked and
+/// takes less time.
 ///
 /// # Safety
 /// What stands at `place` must be a library that may be loaded: its initialisers run.

@@ -23,8 +23,8 @@ pub struct Metadata {
     pub render_time_seconds: Option<f64>,
     /// Of which larger picture this is a part; none for a whole one. OpenEXR's data window in its display window.
     pub window: Option<Window>,
-    /// Texts under names of their own, which have a slash in them (`cryptomatte/5e4b1a2/name`) and 255 bytes at most; in the order of the names when
-    /// read. OpenEXR alone.
+    /// Texts under names of their own, which have a slash in them (`cryptomatte/5e4b1a2/name`) and 255 bytes at most;
+    /// in the order of the names when read. OpenEXR alone.
     pub texts: Vec<(String, String)>,
 }
 

@@ -1,11 +1,13 @@
 //! Pixels, and the files they are kept in.
 //!
-//! Pixels themselves, what a camera makes of them ([`Response`]) and how two pictures differ are the core's; what reads and writes files is here.
+//! Pixels themselves, what a camera makes of them ([`Response`]) and how two pictures differ are the core's; what reads
+//! and writes files is here.
 //!
 //! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
-//! (OpenEXR, Radiance), 8-bit codes everywhere else, TIFF included, by what a camera makes of light. `samples.rs` turns pixels into a file's samples, and a
-//! backend moves them: `oiio` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
-//! same pixels, and read PNG by the same decoder (`picture.rs`). What else a pixel has goes into further channels of OpenEXR files (`channels.rs`). Noise is taken out by [`denoise`].
+//! (OpenEXR, Radiance), 8-bit codes everywhere else, TIFF included, by what a camera makes of light. `samples.rs` turns
+//! pixels into a file's samples, and a backend moves them: `oiio` (OpenImageIO, feature `oiio`) or `pure.rs` (the
+//! crates exr and image). Both write the same pixels, and read PNG by the same decoder (`picture.rs`). What else a
+//! pixel has goes into further channels of OpenEXR files (`channels.rs`). Noise is taken out by [`denoise`].
 
 mod channels;
 pub mod denoise;

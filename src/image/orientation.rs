@@ -2,8 +2,8 @@
 
 use super::samples::{Samples, Values};
 
-/// The picture as it is seen, where `orientation` says how it lies in the file: 1 to 8 as EXIF counts (CIPA DC-008, *Exif 2.32*, tag 274);
-/// everything else is 1, as it is seen.
+/// The picture as it is seen, where `orientation` says how it lies in the file: 1 to 8 as EXIF counts (CIPA
+/// DC-008, *Exif 2.32*, tag 274); everything else is 1, as it is seen.
 pub(super) fn upright(samples: Samples, orientation: u32) -> Samples {
     if !(2..=8).contains(&orientation) {
         return samples;

@@ -17,7 +17,8 @@ use super::{Channel, guarded, picture, pure_channels};
 
 type Result<T> = std::result::Result<T, String>;
 
-// Attributes under the names that OpenImageIO gives them. The crate has a field for the program, but names it `software`.
+// Attributes under the names that OpenImageIO gives them. The crate has a field for the program, but names it
+// `software`.
 const SOFTWARE: &str = "Software";
 const WORLD_TO_SCREEN: &str = "worldToScreen";
 const FOVCOT: &str = "fovcot";
@@ -113,7 +114,8 @@ pub(super) fn tiled(encoding: Encoding) -> openexr::Encoding {
     }
 }
 
-/// A text of a file, in UTF-8 as OpenImageIO writes it. The crate's own conversion is to Latin-1, and knows no other letters.
+/// A text of a file, in UTF-8 as OpenImageIO writes it. The crate's own conversion is to Latin-1, and knows no other
+/// letters.
 pub(super) fn text(text: &str) -> Text {
     Text::from_slice_unchecked(text.as_bytes())
 }
@@ -163,7 +165,8 @@ fn openexr_magic(path: &Path) -> Result<bool> {
     Ok(exr::meta::magic_number::is_exr(&mut file).unwrap_or(false))
 }
 
-/// Where a file's pixels lie in the picture that it holds a part of. None where it holds the whole, as every file that is not OpenEXR.
+/// Where a file's pixels lie in the picture that it holds a part of. None where it holds the whole, as every file that
+/// is not OpenEXR.
 pub(super) fn placed(path: &Path) -> Result<Option<Placed>> {
     if !openexr_magic(path)? {
         return Ok(None);

@@ -11,7 +11,8 @@ use super::{Difference, Image, Response, file};
 use crate::error::Result;
 use crate::math::Vec3;
 
-/// A picture that others are held against, as its file would hold them: what codes cut off, and halves round, is no difference.
+/// A picture that others are held against, as its file would hold them: what codes cut off, and halves round, is no
+/// difference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     /// As [`read`](super::read) has it; of codes of 16 bits, what eight of them hold.
@@ -46,7 +47,8 @@ impl Reference {
         Ok(Self { image, kind, has_alpha, is_radiance })
     }
 
-    /// How far `image` is from it, once it is what such a file would hold: of codes, what the `response` makes of light.
+    /// How far `image` is from it, once it is what such a file would hold: of codes, what the `response` makes of
+    /// light.
     ///
     /// # Errors
     /// [`Error::Check`](crate::Error::Check) where the sizes differ, and those of [`Image::check`].
@@ -63,8 +65,8 @@ impl Reference {
         if self.kind != Type::Half && !self.is_radiance {
             return Ok(difference);
         }
-        // What halves hold may stand in longer numbers, to which nothing is rounded; and other programs round to Radiance's
-        // steps where this one's cuts off.
+        // What halves hold may stand in longer numbers, to which nothing is rounded; and other programs round to
+        // Radiance's steps where this one's cuts off.
         let longer = held(Type::Float)?;
         Ok(if longer.rmse < difference.rmse || difference.rmse.is_nan() { longer } else { difference })
     }
@@ -75,7 +77,8 @@ fn through(image: &Image, kind: Type, alpha: bool, response: &Response) -> Image
     samples::decode(samples::encode(image, kind, alpha, response))
 }
 
-/// What Radiance's format holds of a colour: of each channel eight bits, cut off, under the exponent of the largest (Ward 1991, *Real pixels*).
+/// What Radiance's format holds of a colour: of each channel eight bits, cut off, under the exponent of the largest
+/// (Ward 1991, *Real pixels*).
 fn shared_exponent(color: Vec3) -> Vec3 {
     let largest = color.max_element();
     // Below, as for what is NaN, all is black.
@@ -96,8 +99,8 @@ fn starts_with(path: &Path, first: &[u8]) -> bool {
 mod tests {
     use super::*;
 
-    /// Bytes by Ward's own routine, `setcolr` of ray/src/common/color.c: d = frexp(largest, &e) * 256 / largest, each byte the
-    /// whole part of channel times d, the fourth e + 128; and back with ldexp(byte, e - 8).
+    /// Bytes by Ward's own routine, `setcolr` of ray/src/common/color.c: d = frexp(largest, &e) * 256 / largest, each
+    /// byte the whole part of channel times d, the fourth e + 128; and back with ldexp(byte, e - 8).
     #[test]
     fn colours_under_a_shared_exponent() {
         for (color, bytes, exponent) in [

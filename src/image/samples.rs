@@ -66,7 +66,8 @@ impl Channels {
     }
 }
 
-/// What a file of this type holds for the image: of codes, what the `response` makes of it. Without alpha the image is laid over black.
+/// What a file of this type holds for the image: of codes, what the `response` makes of it. Without alpha the image is
+/// laid over black.
 pub(super) fn encode(image: &Image, kind: Type, alpha: bool, response: &Response) -> Samples {
     let alpha = alpha.then_some(if kind == Type::U8 { Alpha::Straight } else { Alpha::Premultiplied });
     let channels = Channels { colour: true, alpha };

@@ -5,10 +5,10 @@
 //! transform puts them. A sphere stays one under a similarity; under any other transform it is the unit sphere of
 //! its material, placed by an instance, which costs a transform a sphere and keeps it exact.
 //!
-//! Decided where courses differ: lights and cameras are not moved by the transform; `maxverts` and `maxvertnorms` promise
-//! sizes that nobody needs, and are only read; colours are linear; a file without lights is lit by `ambient` and
-//! `emission` alone; where nothing is hit the picture is black; all faces have two sides. `maxdepth` counts mirrored rays, and a
-//! surface mirrors by its `specular`.
+//! Decided where courses differ: lights and cameras are not moved by the transform; `maxverts` and `maxvertnorms`
+//! promise sizes that nobody needs, and are only read; colours are linear; a file without lights is lit by `ambient`
+//! and `emission` alone; where nothing is hit the picture is black; all faces have two sides. `maxdepth` counts
+//! mirrored rays, and a surface mirrors by its `specular`.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -170,7 +170,8 @@ impl Reader {
         Ok(())
     }
 
-    /// `translate`, `rotate` or `scale`: multiplies the transform from the right, so that it comes first for what follows.
+    /// `translate`, `rotate` or `scale`: multiplies the transform from the right, so that it comes first for what
+    /// follows.
     fn multiply_transform(&mut self, keyword: &str, statement: &mut Statement<'_>) -> Placeless<()> {
         let step = match keyword {
             "translate" => DAffine3::from_translation(statement.vector()?),

@@ -1,13 +1,15 @@
 //! Shapes as scene files give them, in f64, and the local origins that they are rounded relative to.
 //!
-//! Tracers take shapes in f32. Near zero nobody sees what that rounds; at 4500000.3, a northing in metres, it is 0.2 m. So where rounding
-//! moves a shape by more than its size allows, and all that stands with it is far from zero, the shapes are kept relative to a local origin, an f64
-//! point in their middle that an instance translates them by, as a [`Mesh`](crate::scene::Mesh) is kept relative to its own. [`World`](crate::World) adds both up in
-//! f64 once it knows where the scene's middle is.
+//! Tracers take shapes in f32. Near zero nobody sees what that rounds; at 4500000.3, a northing in metres, it is 0.2 m.
+//! So where rounding moves a shape by more than its size allows, and all that stands with it is far from zero, the
+//! shapes are kept relative to a local origin, an f64 point in their middle that an instance translates them by, as a
+//! [`Mesh`](crate::scene::Mesh) is kept relative to its own. [`World`](crate::World) adds both up in f64 once it knows
+//! where the scene's middle is.
 //!
-//! All shapes of a group have one, so that polygons which share a corner share it after rounding, too, and that a group of small things about zero, which is
-//! rounded to f32 there anyway, stays one. f64 coordinates in [`Shape`], the plainer way, would cost every scene twice the memory, and every test of a ray the
-//! conversion, for the few that lie far from zero.
+//! All shapes of a group have one, so that polygons which share a corner share it after rounding, too, and that a group
+//! of small things about zero, which is rounded to f32 there anyway, stays one. f64 coordinates in [`Shape`], the
+//! plainer way, would cost every scene twice the memory, and every test of a ray the conversion, for the few that lie
+//! far from zero.
 
 use std::slice;
 use std::sync::Arc;
@@ -17,7 +19,8 @@ use crate::math::{DAabb, DMat3, DVec3, MAX_COORDINATE, Vec3};
 use crate::scene::choose_origin;
 use crate::shape::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Shape, Sphere};
 
-/// How far rounding may move a shape from where its file has it, in units of its size: what f32 is off by at most 4096 sizes from zero.
+/// How far rounding may move a shape from where its file has it, in units of its size: what f32 is off by at most 4096
+/// sizes from zero.
 const TOLERANCE: f64 = 1.0 / 8192.0;
 
 /// A shape in f64, with the fields of the [`Shape`] that it becomes.
@@ -62,8 +65,8 @@ pub(super) enum DShape {
     },
 }
 
-/// The local origin of shapes that stand together: zero where f32 holds them as they are, or a middle would not serve them better. Planes, which are everywhere,
-/// have no say.
+/// The local origin of shapes that stand together: zero where f32 holds them as they are, or a middle would not serve
+/// them better. Planes, which are everywhere, have no say.
 pub(super) fn local_origin<'a>(shapes: impl Iterator<Item = &'a DShape> + Clone) -> DVec3 {
     let mut bounded = shapes.filter(|shape| !matches!(shape, DShape::Plane { .. }));
     let bounds = bounded.clone().flat_map(DShape::points).fold(DAabb::EMPTY, |all, &p| all.include(p));
@@ -112,7 +115,8 @@ impl DShape {
         }
     }
 
-    /// The shape in f32, relative to `origin`; or to a point in its own middle, which is then given, where nothing of it is left there.
+    /// The shape in f32, relative to `origin`; or to a point in its own middle, which is then given, where nothing of
+    /// it is left there.
     ///
     /// # Errors
     /// Those of [`DShape::check`].
@@ -146,8 +150,8 @@ impl DShape {
         }
     }
 
-    /// The smallest of its measures, which is what rounding spoils first; of a plane, which has none, that of most things which stand on
-    /// planes: one metre.
+    /// The smallest of its measures, which is what rounding spoils first; of a plane, which has none, that of most
+    /// things which stand on planes: one metre.
     fn size(&self) -> f64 {
         match self {
             Self::Sphere { radius, .. } | Self::Disk { radius, .. } => *radius,

@@ -18,7 +18,8 @@ const TASK: usize = 1 << 14;
 /// What compression may make of a colour of full strength: half a code of 256 too much, and some.
 const MAX_BY_ROUNDING: f32 = 1.0 + 1.0 / 255.0;
 
-/// Makes a scene of a file ready, whatever its format: numbers that are none, a last check of all indices, axes and normals; and says what is odd about it.
+/// Makes a scene of a file ready, whatever its format: numbers that are none, a last check of all indices, axes and
+/// normals; and says what is odd about it.
 ///
 /// # Errors
 /// [`Error::Input`] for an index that is out of range, and for a scene without a primitive.
@@ -104,7 +105,8 @@ fn nothing_to_render(path: &Path, warnings: &[Warning]) -> Error {
     Error::input(path, "", message)
 }
 
-/// Has components of colours and of texture coordinates that are not finite be 0, and 1 where they are alpha; and tells of how many colours and coordinates.
+/// Has components of colours and of texture coordinates that are not finite be 0, and 1 where they are alpha; and tells
+/// of how many colours and coordinates.
 fn make_finite(geometry: &mut Geometry) -> usize {
     fn each<T: AsMut<[f32; N]> + Send, const N: usize>(values: &mut [T], instead: [f32; N]) -> usize {
         let mend = |value: &mut T| {

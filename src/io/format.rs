@@ -1,4 +1,5 @@
-//! The formats of scene files, and what is known of each: a new one is a variant here, which the compiler then asks for.
+//! The formats of scene files, and what is known of each: a new one is a variant here, which the compiler then asks
+//! for.
 
 use std::path::Path;
 
@@ -51,7 +52,8 @@ pub const SUFFIXES: [&str; TABLE.len()] = {
     suffixes
 };
 
-/// The suffixes of formats that hold meshes and not a scene, which would bring a second camera and other light where it is included.
+/// The suffixes of formats that hold meshes and not a scene, which would bring a second camera and other light where it
+/// is included.
 pub(super) fn mesh_suffixes() -> impl Iterator<Item = &'static str> {
     TABLE.iter().filter(|(_, format)| format.holds_meshes()).map(|(suffix, _)| *suffix)
 }
@@ -63,7 +65,8 @@ impl Format {
         TABLE.iter().find(|(known, _)| *known == suffix).map(|(_, format)| *format)
     }
 
-    /// Reads a file, as far as that differs from format to format; `path` is for messages, and for the files that it refers to.
+    /// Reads a file, as far as that differs from format to format; `path` is for messages, and for the files that it
+    /// refers to.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for anything that is wrong with the file or with what it refers to.
@@ -129,8 +132,8 @@ impl Format {
         }
     }
 
-    /// Whether its reader says itself which meshes lack texture coordinates: glTF's knows of sets of them, and that of scenes which
-    /// meshes are its own.
+    /// Whether its reader says itself which meshes lack texture coordinates: glTF's knows of sets of them, and that of
+    /// scenes which meshes are its own.
     pub(super) const fn tells_of_bare_meshes(self) -> bool {
         match self {
             Self::Gltf | Self::Toml => true,

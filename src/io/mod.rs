@@ -48,7 +48,8 @@ type Placeless<T> = std::result::Result<T, String>;
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
 /// What is odd but can be rendered comes back as warnings: a missing texture, triangles with corners that are not
-/// finite (they keep their numbers, are never hit, and have no other corner left), features that the renderer does not have.
+/// finite (they keep their numbers, are never hit, and have no other corner left), features that the renderer does not
+/// have.
 ///
 /// # Errors
 /// [`Error::Input`] for anything that is wrong with the file or with what it refers to.
@@ -56,8 +57,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, Vec<Warning>)>
     load_watched(path, options, None)
 }
 
-/// Reads a scene as [`load`] does, and calls `on_bytes` with the number of bytes of the file that were read since, from any thread. Bytes may be
-/// skipped, or read more than once, so that the sum may differ from the file's length.
+/// Reads a scene as [`load`] does, and calls `on_bytes` with the number of bytes of the file that were read since, from
+/// any thread. Bytes may be skipped, or read more than once, so that the sum may differ from the file's length.
 ///
 /// # Errors
 /// As [`load`].

@@ -1,15 +1,15 @@
 //! Numbers as they stand in text files.
 //!
-//! Nearly all have so few digits that one division of two numbers without an error gives the one nearest to them (Clinger 1990, *How to read
-//! floating point numbers accurately*). The standard library does the same, but is told where a word ends, and that it is UTF-8, for which
-//! each byte has been read twice before.
+//! Nearly all have so few digits that one division of two numbers without an error gives the one nearest to them
+//! (Clinger 1990, *How to read floating point numbers accurately*). The standard library does the same, but is told
+//! where a word ends, and that it is UTF-8, for which each byte has been read twice before.
 
 use std::str::FromStr;
 
 /// What a word may be read as.
 pub(super) trait Number: FromStr {
-    /// The number that a text begins with, whatever comes after it, and how many bytes it is long; the same as [`FromStr`] makes of these bytes. None
-    /// where that is not sure at once.
+    /// The number that a text begins with, whatever comes after it, and how many bytes it is long; the same as
+    /// [`FromStr`] makes of these bytes. None where that is not sure at once.
     fn leading(_text: &[u8]) -> Option<(Self, usize)> {
         None
     }
@@ -96,7 +96,8 @@ fn sign(text: &[u8]) -> usize {
     usize::from(matches!(text.first(), Some(b'+' | b'-')))
 }
 
-/// Digits that a text begins with, after those that came `before`, and how many they are; of too many, what is left of them in 64 bits.
+/// Digits that a text begins with, after those that came `before`, and how many they are; of too many, what is left of
+/// them in 64 bits.
 #[inline]
 pub(super) fn whole(text: &[u8], before: u64) -> (u64, usize) {
     let (mut digits, mut count) = (before, 0);

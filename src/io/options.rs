@@ -31,14 +31,15 @@ impl LoadOptions {
 /// In which pose things are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Animation {
-    /// Of the file's animations, those with these names, or these numbers, counted from 0, played at once: of two that move the same, the later one counts. `all` is all
-    /// of them, where none has that name. None where the file has only one.
+    /// Of the file's animations, those with these names, or these numbers, counted from 0, played at once: of two that
+    /// move the same, the later one counts. `all` is all of them, where none has that name. None where the file has
+    /// only one.
     pub names: Vec<String>,
-    /// When, in seconds from the animation's start; before its first key and after its last one all stands still. None, and no
-    /// name, is the pose that the file stores.
+    /// When, in seconds from the animation's start; before its first key and after its last one all stands still. None,
+    /// and no name, is the pose that the file stores.
     pub time: Option<f64>,
-    /// Seconds from `time` on in which things go from where they are at time 0 of a picture to where they are at its time 1; 0 where
-    /// nothing is to move. What is deformed by a skin or morph targets keeps its shape.
+    /// Seconds from `time` on in which things go from where they are at time 0 of a picture to where they are at its
+    /// time 1; 0 where nothing is to move. What is deformed by a skin or morph targets keeps its shape.
     pub exposure: f64,
 }
 

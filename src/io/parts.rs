@@ -1,7 +1,7 @@
 //! Primitives of scene files that name a material for each, sorted: one geometry for each material and kind.
 //!
-//! Such files mix materials freely. A geometry for each run of equal ones, in the order of the file, would give a file that
-//! alternates between two colours as many geometries as it has lines, and tracers a part for each.
+//! Such files mix materials freely. A geometry for each run of equal ones, in the order of the file, would give a file
+//! that alternates between two colours as many geometries as it has lines, and tracers a part for each.
 //!
 //! Shapes that have a [local origin](super::dshape::local_origin) are a group of their own.
 

@@ -1,7 +1,7 @@
 //! What the head of a large file promises of its mesh, before anything of the rest is read.
 //!
-//! Where memory is limited, a mesh that cannot fit is refused at once instead of after minutes of loading. Only heads that are no
-//! work to read are asked; of the other formats nothing is known before all of it is.
+//! Where memory is limited, a mesh that cannot fit is refused at once instead of after minutes of loading. Only heads
+//! that are no work to read are asked; of the other formats nothing is known before all of it is.
 
 use std::path::Path;
 
@@ -17,8 +17,8 @@ pub struct Promised {
     pub bytes: u64,
 }
 
-/// What is promised by a PLY file or a binary STL file that is long enough to keep it; none by any other. Whatever is wrong with the
-/// file is for [`load`](super::load) to say.
+/// What is promised by a PLY file or a binary STL file that is long enough to keep it; none by any other. Whatever is
+/// wrong with the file is for [`load`](super::load) to say.
 pub fn promised(path: &Path) -> Option<Promised> {
     let file = Mapped::open(path).ok()?;
     Format::of(path)?.promised(path, &file)
@@ -39,7 +39,8 @@ mod tests {
         promised(&path)
     }
 
-    /// A binary file of a pentagon and a triangle, each with a byte for another property where there is one, and so many edges.
+    /// A binary file of a pentagon and a triangle, each with a byte for another property where there is one, and so
+    /// many edges.
     fn polygons(property: &str, edges: u32) -> Vec<u8> {
         let other = if edges > 0 {
             format!("element edge {edges}\nproperty int vertex1\nproperty int vertex2\n")

@@ -1,7 +1,7 @@
 //! Records of one size, read in parallel from where they lie in the file.
 //!
-//! Each task reads a stretch of some thousand records into its place in the result and lets the file's pages go, so that the
-//! result is the same for any number of threads and the file takes no memory beside it.
+//! Each task reads a stretch of some thousand records into its place in the result and lets the file's pages go, so
+//! that the result is the same for any number of threads and the file takes no memory beside it.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -1,7 +1,7 @@
 //! Statements of line-based scene files: a keyword, and arguments that are nearly all numbers.
 //!
-//! A `#` at the beginning of a word starts a comment. What is wrong with a statement is said with the word, and with what
-//! the statement looks like when it is right.
+//! A `#` at the beginning of a word starts a comment. What is wrong with a statement is said with the word, and with
+//! what the statement looks like when it is right.
 
 use std::iter;
 

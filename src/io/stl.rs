@@ -1,9 +1,9 @@
 //! STL, text and binary (3D Systems 1989, *StereoLithography interface specification*).
 //!
 //! A file is a list of loose triangles. Corners that are equal to the bit become one vertex, so that the mesh is
-//! connected as it was before it was written: it takes a third of the memory, and its triangles find each other's corners
-//! in the cache. The facets' own normals are left unread: they only repeat the corners'
-//! order, or contradict it.
+//! connected as it was before it was written: it takes a third of the memory, and its triangles find each other's
+//! corners in the cache. The facets' own normals are left unread: they only repeat the corners' order, or contradict
+//! it.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -45,7 +45,8 @@ fn promised(bytes: &[u8]) -> Option<u64> {
     Some(u32::from_le_bytes(*count).into())
 }
 
-/// What the header of a binary file says, if the file has as much; neighbours share corners, which are left out of account.
+/// What the header of a binary file says, if the file has as much; neighbours share corners, which are left out of
+/// account.
 pub(super) fn promised_mesh(bytes: &[u8]) -> Option<Promised> {
     let triangles = promised(bytes).filter(|_| !is_text(bytes))?;
     let is_there = HEADER as u64 + triangles * FACET as u64 <= bytes.len() as u64;

@@ -39,8 +39,8 @@ pub(super) fn is_slip(word: &str, known: &str) -> bool {
 }
 
 /// Letters to insert, delete, replace or exchange with their neighbour to make one word of the other, in any case
-/// (Damerau 1964, *A technique for computer detection and correction of spelling errors*; by the recurrence of Wagner and
-/// Fischer 1974, *The string-to-string correction problem*).
+/// (Damerau 1964, *A technique for computer detection and correction of spelling errors*; by the recurrence of Wagner
+/// and Fischer 1974, *The string-to-string correction problem*).
 fn distance(a: &str, b: &str) -> usize {
     let [a, b] = [a, b].map(|word| word.chars().flat_map(char::to_lowercase).collect::<Vec<_>>());
     // Rows of the table for one and two letters less of `a`.

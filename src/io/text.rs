@@ -12,7 +12,8 @@ pub(super) fn without_mark(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
-/// The length of the first line with its end (`\n`, `\r\n`, or `\r` alone, as programs of the old Macintosh wrote them), and that without it.
+/// The length of the first line with its end (`\n`, `\r\n`, or `\r` alone, as programs of the old Macintosh wrote
+/// them), and that without it.
 pub(super) fn first_line(text: &[u8]) -> (usize, usize) {
     match memchr::memchr2(b'\n', b'\r', text) {
         Some(end) if text[end..].starts_with(b"\r\n") => (end + 2, end),
@@ -53,7 +54,8 @@ impl<'a> Lines<'a> {
 impl<'a> Iterator for Lines<'a> {
     type Item = (usize, Cow<'a, [u8]>);
 
-    /// The next line and its number; lines that end in a backslash are joined with what follows, but where they end in a comment, which may be a path of Windows.
+    /// The next line and its number; lines that end in a backslash are joined with what follows, but where they end in
+    /// a comment, which may be a path of Windows.
     fn next(&mut self) -> Option<Self::Item> {
         let line = self.physical()?;
         let number = self.line;
@@ -126,8 +128,8 @@ impl<'a> Words<'a> {
         number(word).ok_or(Some(word))
     }
 
-    /// What `read` makes of the next word, if it takes all of it; else the word stays where it is. `read` sees the text from there on, and says how many
-    /// bytes it takes: so each is read once, and not to find the word's end before.
+    /// What `read` makes of the next word, if it takes all of it; else the word stays where it is. `read` sees the text
+    /// from there on, and says how many bytes it takes: so each is read once, and not to find the word's end before.
     #[inline]
     pub(super) fn read<T>(&mut self, read: impl FnOnce(&'a [u8]) -> Option<(T, usize)>) -> Option<T> {
         let (begin, line) = self.begin();
@@ -208,14 +210,15 @@ pub(super) fn quoted(bytes: &[u8]) -> String {
     format!("{short:?}")
 }
 
-/// A name in a file, as text. One that is not UTF-8 is taken for Latin-1, in which every byte is a letter: whatever it was written in, names that
-/// differ stay different.
+/// A name in a file, as text. One that is not UTF-8 is taken for Latin-1, in which every byte is a letter: whatever it
+/// was written in, names that differ stay different.
 pub(super) fn name(bytes: &[u8]) -> String {
     let bytes = bytes.trim_ascii();
     str::from_utf8(bytes).map_or_else(|_| bytes.iter().copied().map(char::from).collect(), str::to_owned)
 }
 
-/// What of a name stands before a comment: a `#` behind white space. Names hold both, so that the whole is to be tried before.
+/// What of a name stands before a comment: a `#` behind white space. Names hold both, so that the whole is to be tried
+/// before.
 pub(super) fn before_comment(name: &str) -> &str {
     let begin = name.match_indices('#').map(|(at, _)| at).find(|at| name[..*at].ends_with(char::is_whitespace));
     begin.map_or(name, |at| name[..at].trim_end())

@@ -78,15 +78,16 @@ pub(super) fn beside(file: &Path, name: &str) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
 }
 
-/// The format of a picture, if it is one that is read. It is told by the first bytes, since suffixes and MIME types lie; but Targa has none that tell, so that its
-/// name has to say it, and its header not to contradict.
+/// The format of a picture, if it is one that is read. It is told by the first bytes, since suffixes and MIME types
+/// lie; but Targa has none that tell, so that its name has to say it, and its header not to contradict.
 fn format(bytes: &[u8], name: &str) -> Option<ImageFormat> {
     match image::guess_format(bytes) {
         Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Bmp)) => Some(format),
         Ok(_) => None,
         Err(_) => {
             let is_named = Path::new(name).extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("tga"));
-            // Whether it has a palette, how it is stored, and the bits of a pixel (Truevision 1991, *TGA File Format Specification*, version 2.0).
+            // Whether it has a palette, how it is stored, and the bits of a pixel (Truevision 1991, *TGA File Format
+            // Specification*, version 2.0).
             let is_sound =
                 matches!(bytes, [_, 0 | 1, 1..=3 | 9..=11, ..]) && matches!(bytes.get(16), Some(8 | 15 | 16 | 24 | 32));
             (is_named && is_sound).then_some(ImageFormat::Tga)

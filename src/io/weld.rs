@@ -1,12 +1,13 @@
 //! Finding vertices that are equal to the bit.
 //!
-//! [`Weld`] is an open-addressing table of indices over the list of distinct vertices itself. The standard map would store
-//! every vertex twice and hash it with a keyed function, at about four times the cost.
+//! [`Weld`] is an open-addressing table of indices over the list of distinct vertices itself. The standard map would
+//! store every vertex twice and hash it with a keyed function, at about four times the cost.
 //!
-//! [`weld`] does the same for many vertices at once, in parallel and with the same result: each stretch of the input has
-//! a table of its own, small enough for the cache, and since neighbours share most of their vertices little is left to
-//! compare between stretches. That is divided by hash, so that again each part has a small table of its own. One table
-//! for all of 60 million corners misses the cache at most looks: it took 1.8 times the processor time, on one thread.
+//! [`weld`] does the same for many vertices at once, in parallel and with the same result: each stretch of the input
+//! has a table of its own, small enough for the cache, and since neighbours share most of their vertices little is left
+//! to compare between stretches. That is divided by hash, so that again each part has a small table of its own. One
+//! table for all of 60 million corners misses the cache at most looks: it took 1.8 times the processor time, on one
+//! thread.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,11 +1,13 @@
 //! Every accelerator on the same rays, held against brute force.
 //!
-//! Rays are those of a picture, one through the middle of each pixel, and difficult ones, in random order, so that any number of
-//! them from the start is a fair sample of all. Brute force goes first and answers as many as it can within a time; the others
-//! are asked the same. To hold them against each other on all rays instead would compare trees that are built of the same parts.
+//! Rays are those of a picture, one through the middle of each pixel, and difficult ones, in random order, so that any
+//! number of them from the start is a fair sample of all. Brute force goes first and answers as many as it can within a
+//! time; the others are asked the same. To hold them against each other on all rays instead would compare trees that
+//! are built of the same parts.
 //!
-//! A native accelerator must give the hits of brute force to the bit, so whatever differs is wrong; with a textbook's methods, whose t are f32's, it must name the
-//! same primitives. Embree is judged as [`compare`](super::compare) judges it.
+//! A native accelerator must give the hits of brute force to the bit, so whatever differs is wrong; with a textbook's
+//! methods, whose t are f32's, it must name the same primitives. Embree is judged as [`compare`](super::compare) judges
+//! it.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -71,8 +73,8 @@ pub struct Row {
     pub bytes: usize,
     /// Millions of the compared rays a second, on all threads.
     pub mrays_per_s: f64,
-    /// Rays on which the answer is not that of brute force: for native accelerators to the bit, for Embree and textbooks' methods the
-    /// primitive.
+    /// Rays on which the answer is not that of brute force: for native accelerators to the bit, for Embree and
+    /// textbooks' methods the primitive.
     pub differing: u64,
     /// Of those, [`Class::Tie`].
     pub tie: u64,
@@ -120,7 +122,8 @@ impl Setup<'_> {
     /// Builds and asks one after the other.
     ///
     /// # Errors
-    /// [`Error::Interrupted`] once `control.cancel` is set, [`Error::Memory`] for more rays than there is room for, and those of Embree.
+    /// [`Error::Interrupted`] once `control.cancel` is set, [`Error::Memory`] for more rays than there is room for, and
+    /// those of Embree.
     pub fn run(&self, control: Control<'_>) -> Result<Report> {
         let world = self.renderer.world();
         let queries = self.queries()?;

@@ -156,7 +156,8 @@ impl Rational {
         }
     }
 
-    /// As `cmp`, of roots that are rounded to 256 bits, where those of two quadratics may be one: equal where they differ by 2^-200 of themselves.
+    /// As `cmp`, of roots that are rounded to 256 bits, where those of two quadratics may be one: equal where they
+    /// differ by 2^-200 of themselves.
     pub fn cmp_root(&self, other: &Self) -> Ordering {
         let (here, there) = (self.numerator.mul(&other.denominator), other.numerator.mul(&self.denominator));
         let difference = here.sub(&there);

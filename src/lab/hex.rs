@@ -1,6 +1,7 @@
 //! Numbers to the bit: hexadecimal floats, as C17 (6.4.4.2) and printf's %a have them.
 //!
-//! Decimal digits that are read back the same exist for every f32, and are accepted as well; these show which bits are set.
+//! Decimal digits that are read back the same exist for every f32, and are accepted as well; these show which bits are
+//! set.
 
 use crate::math::Vec3;
 use crate::ray::Ray;
@@ -25,7 +26,8 @@ pub fn to_hex(x: f32) -> String {
     format!("{sign}0x{lead}{point}{digits}p{exponent:+}")
 }
 
-/// Reads a number, hexadecimal or decimal; None for anything else, and for a hexadecimal one that is not an f32 to the bit.
+/// Reads a number, hexadecimal or decimal; None for anything else, and for a hexadecimal one that is not an f32 to the
+/// bit.
 pub fn from_text(text: &str) -> Option<f32> {
     let text = text.trim();
     let (negative, size) = match text.strip_prefix('-') {

@@ -1,11 +1,11 @@
 //! What judges the rest.
 //!
 //! [`oracle`] answers exactly, slowly, and alone: it shares no code with any tracer. [`rounding`] says how far an
-//! answer computed in f32 or f64 may be from that, and [`classify_closest`] puts both together: of two engines that differ on a
-//! ray, which is wrong, if any. [`compare`] does so for every ray of a picture and for rays made to be difficult.
-//! [`all`] does so for every accelerator at once. [`stress`] runs every method on the cases that are known to be hard, and [`tree`] is the
-//! oracle at a pace for that. [`inspect`] says what a scene holds, and [`suspicious`] what about it looks like a mistake, before anything is
-//! traced; [`mod@bench`] times the engines against each other.
+//! answer computed in f32 or f64 may be from that, and [`classify_closest`] puts both together: of two engines that
+//! differ on a ray, which is wrong, if any. [`compare`] does so for every ray of a picture and for rays made to be
+//! difficult. [`all`] does so for every accelerator at once. [`stress`] runs every method on the cases that are known
+//! to be hard, and [`tree`] is the oracle at a pace for that. [`inspect`] says what a scene holds, and [`suspicious`]
+//! what about it looks like a mistake, before anything is traced; [`mod@bench`] times the engines against each other.
 
 pub mod all;
 pub mod bench;

@@ -34,7 +34,8 @@ pub struct Primitive<'a> {
 }
 
 impl Primitive<'_> {
-    /// Whether the native engine's verdict on it is that of exact arithmetic. It is not of shapes that are placed, to which rays are brought in f64.
+    /// Whether the native engine's verdict on it is that of exact arithmetic. It is not of shapes that are placed, to
+    /// which rays are brought in f64.
     pub fn is_decided_exactly(&self) -> bool {
         match self.body {
             Body::Triangle(_) => true,

@@ -171,7 +171,8 @@ pub enum Asked {
     },
 }
 
-/// A ray on which the engines differ. Its `Display` is what it was judged to be, what was answered, and the ray as `twincast trace --ray` takes it.
+/// A ray on which the engines differ. Its `Display` is what it was judged to be, what was answered, and the ray as
+/// `twincast trace --ray` takes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// What it was judged to be.

@@ -1,9 +1,9 @@
 //! Which pixels of two pictures differ, and whether a ray explains it.
 //!
-//! A pixel that differs is traced again, native leading: if the engines part on one of its rays, on the camera ray or on
-//! one that follows from it, that ray's class is the explanation. Embree's answer may depend on the packet that a ray
-//! travels in, so each ray is asked in every width. What then still looks the same was rendered in yet another packet:
-//! a ray that native's own hit shows to be a boundary ray explains that as well, and nothing else does.
+//! A pixel that differs is traced again, native leading: if the engines part on one of its rays, on the camera ray or
+//! on one that follows from it, that ray's class is the explanation. Embree's answer may depend on the packet that a
+//! ray travels in, so each ray is asked in every width. What then still looks the same was rendered in yet another
+//! packet: a ray that native's own hit shows to be a boundary ray explains that as well, and nothing else does.
 
 use std::sync::Mutex;
 

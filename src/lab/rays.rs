@@ -80,7 +80,8 @@ impl<'a> Aim<'a> {
         })
     }
 
-    /// Points of a random primitive at a time, in the world; a triangle's corners, the first of which is any of the three.
+    /// Points of a random primitive at a time, in the world; a triangle's corners, the first of which is any of the
+    /// three.
     fn corners(&self, random: &mut Random, time: f32) -> [Vec3; 3] {
         // Untraceable corners are no targets; a few draws find others in any mesh that has them.
         for _ in 0..8 {

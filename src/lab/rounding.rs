@@ -2,7 +2,8 @@
 //!
 //! The bounds are a priori rounding-error bounds (Higham 2002, chapter 3): a value computed by n rounded operations
 //! from terms whose absolute values add up to P (the *permanent*: the same polynomial, every sign a plus) is off by at
-//! most gamma(n) P. Terms of second order are added with gamma(n) u. Below, |x| is taken component by component; a, b, c are corners relative to the ray's origin.
+//! most gamma(n) P. Terms of second order are added with gamma(n) u. Below, |x| is taken component by component; a, b,
+//! c are corners relative to the ray's origin.
 //!
 //! - **Edges**, in Plücker form det(d, a, b) = d . ((b - a) x (b + a)) / 2. The corners are rounded when the origin is
 //!   subtracted, which moves the determinant by u (|a| . |d x b| + |b| . |d x a|) and no more, since edges are formed
@@ -14,7 +15,8 @@
 //!   the denominator, with e the longest side. Where the error of the denominator reaches it (a ray that grazes the
 //!   plane) t can be anything.
 //! - **Instances**: engines move the ray, not the triangle. The inverse matrix is the adjugate over the determinant;
-//!   its error makes one of the moved origin, o', and direction, d': |o'| . |d x (b - a)| and |d'| . |a x b| in an edge,
+//!   its error makes one of the moved origin, o', and direction, d': |o'| . |d x (b - a)| and |d'| . |a x b| in an
+//!   edge,
 //!   |n| . |o'| and t |n| . |d'| in the numerator of t.
 //! - **Shapes** are intersected in f64, or exactly, by every engine; only the ray that they are given, which is f32, is
 //!   rounded, and the boxes around them are met in f32 (`rounding/shapes.rs`).
@@ -288,8 +290,8 @@ mod tests {
             }
             unsure += u32::from(case % 2 == 1 && allowed.may_meet && allowed.may_pass);
         }
-        // A bound that always says "unsure" would hold as well. Of the rays aimed inside, those under an ill-conditioned
-        // matrix may be, no others.
+        // A bound that always says "unsure" would hold as well. Of the rays aimed inside, those under an
+        // ill-conditioned matrix may be, no others.
         assert!(unsure < 8_000, "{unsure}");
     }
 

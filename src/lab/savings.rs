@@ -1,7 +1,8 @@
-//! What a plan saves: the picture with no more than the scene needs, against the same with one thing after another put back.
+//! What a plan saves: the picture with no more than the scene needs, against the same with one thing after another put
+//! back.
 //!
-//! The two renders of a pair take turns, so that whatever else the machine does touches both; a saving is the median of those of each
-//! turn. The pictures are compared as well: what is left out must not be seen.
+//! The two renders of a pair take turns, so that whatever else the machine does touches both; a saving is the median of
+//! those of each turn. The pictures are compared as well: what is left out must not be seen.
 
 use std::fmt;
 use std::time::Instant;
@@ -141,7 +142,8 @@ mod tests {
     use crate::shape::{Cuboid, Shape};
     use crate::trace::World;
 
-    /// A floor, and above it a tilted square of another material, before a blue sky, lit by the sun and a lamp; without anything but flat, matte surfaces.
+    /// A floor, and above it a tilted square of another material, before a blue sky, lit by the sun and a lamp; without
+    /// anything but flat, matte surfaces.
     fn plain() -> Scene {
         let square = |half: f32, height: f32, tilt: f32, material| {
             let corner = |x: f32, z: f32| Vec3::new(x * half, height + tilt * x, z * half);

@@ -1,4 +1,5 @@
-//! Every shape against exact arithmetic, on rays made to be difficult. Here, since the yardstick ([`exact_shapes`](super::exact_shapes)) is here.
+//! Every shape against exact arithmetic, on rays made to be difficult. Here, since the yardstick
+//! ([`exact_shapes`](super::exact_shapes)) is here.
 
 use std::sync::Arc;
 

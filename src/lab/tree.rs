@@ -1,9 +1,10 @@
 //! The exact nearest hit among many primitives, at a pace of hundreds of thousands of rays a second.
 //!
-//! [`oracle::closest`] meets every primitive with integers. Here a plain binary tree of boxes, in f64, says which triangles
-//! a ray may meet at all; of those, plain f64 under one bound for all of it passes most by (`passes_by`); each of the others is met in
-//! f64 with a running error bound; and only where the bounds leave doubt about a sign, about which is nearest or about an end of the range
-//! does [`oracle::meet`] decide. So the answers are the same, but for the last digits of t.
+//! [`oracle::closest`] meets every primitive with integers. Here a plain binary tree of boxes, in f64, says which
+//! triangles a ray may meet at all; of those, plain f64 under one bound for all of it passes most by (`passes_by`);
+//! each of the others is met in f64 with a running error bound; and only where the bounds leave doubt about a sign,
+//! about which is nearest or about an end of the range does [`oracle::meet`] decide. So the answers are the same, but
+//! for the last digits of t.
 //!
 //! The tree is this file's own: median splits, boxes around exact corners, slabs that are widened by far more than f64
 //! rounds. Shapes are met one by one, as their boxes would be those of the code that is judged.
@@ -55,7 +56,8 @@ struct Candidate {
     index: usize,
     low: f64,
     high: f64,
-    /// Whether it is met, away from its edges, and well within the range; and t is known to all digits but the last few.
+    /// Whether it is met, away from its edges, and well within the range; and t is known to all digits but the last
+    /// few.
     is_sure: bool,
 }
 
@@ -165,8 +167,8 @@ impl Line {
 
 /// Whether plain f64 tells already that a line passes a triangle by: most that are asked, at a twentieth of the time.
 fn passes_by(line: &Line, primitive: &Primitive<'_>) -> bool {
-    // Corners, products and sums are rounded by 2^-53 each; in units of the largest components that is 42 at most, and this is 64. The
-    // products of three f32 neither overflow nor underflow.
+    // Corners, products and sums are rounded by 2^-53 each; in units of the largest components that is 42 at most, and
+    // this is 64. The products of three f32 neither overflow nor underflow.
     const BOUND: f64 = 64.0 * UNIT_ROUNDOFF_64;
     let (Body::Triangle(corners), None) = (primitive.body, primitive.to_world) else { return false };
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - line.origin);
@@ -273,7 +275,8 @@ impl Node {
     }
 }
 
-/// Makes `nodes[node]`, the box around `items`, a leaf or an inner node; `first` is the place of the first item among all.
+/// Makes `nodes[node]`, the box around `items`, a leaf or an inner node; `first` is the place of the first item among
+/// all.
 fn build(nodes: &mut Vec<Node>, node: usize, items: &mut [Boxed<'_>], first: usize) {
     if items.len() <= LEAF {
         nodes[node].first = first as u32;

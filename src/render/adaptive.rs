@@ -1,30 +1,31 @@
 //! How many samples a pixel gets: as many as bring the picture's error below a threshold with the fewest in all.
 //!
-//! A pixel gets them in proportion to its deviation: how far a single one of its samples is off. Of all ways to spend a number of
-//! samples that one leaves the least mean square error (Neyman 1934, *On the two different aspects of the representative
-//! method*). To go on with each pixel until its own error is below the threshold, the usual way, takes samples in
-//! proportion to the square of the deviation. Where all of a picture is noisy that is worth no more than the same number for each pixel,
-//! for both leave the mean of the squares over the mean number. On `scenes/box`, with 20 to 64 samples a pixel, it left
-//! 1.02 to 1.07 of the error of even sampling; this leaves 0.94.
+//! A pixel gets them in proportion to its deviation: how far a single one of its samples is off. Of all ways to spend a
+//! number of samples that one leaves the least mean square error (Neyman 1934, *On the two different aspects of the
+//! representative method*). To go on with each pixel until its own error is below the threshold, the usual way, takes
+//! samples in proportion to the square of the deviation. Where all of a picture is noisy that is worth no more than the
+//! same number for each pixel, for both leave the mean of the squares over the mean number. On `scenes/box`, with 20 to
+//! 64 samples a pixel, it left 1.02 to 1.07 of the error of even sampling; this leaves 0.94.
 //!
-//! The threshold is for those pixels that the fewest samples leave above it: it is their root mean square error, and all others are
-//! below it anyway. For the whole picture's error it would mean something else in front of more background.
+//! The threshold is for those pixels that the fewest samples leave above it: it is their root mean square error, and
+//! all others are below it anyway. For the whole picture's error it would mean something else in front of more
+//! background.
 //!
 //! The samples of a pixel are parted into two, and how far the two means differ tells how far the mean of all is off
 //! (Dammertz, Hanika, Keller and Lensch 2010, *A hierarchical automatic stopping condition for Monte Carlo global
-//! illumination*). The variance of single samples, the alternative, takes well-spread samples for random ones: at every edge
-//! it finds many times the error that there is. For the same reason the first part is a power of two, and the second as many or half of that: those
-//! are well spread by themselves, where every other sample is not.
+//! illumination*). The variance of single samples, the alternative, takes well-spread samples for random ones: at every
+//! edge it finds many times the error that there is. For the same reason the first part is a power of two, and the
+//! second as many or half of that: those are well spread by themselves, where every other sample is not.
 //!
-//! One such difference is a number drawn at random, and small by chance in many a pixel that is noisy. So what a pixel's tells is
-//! averaged with its neighbours', 5 x 5 by binomial weights, which are about as noisy. A path to a small bright light, too, that one pixel has found and
-//! the next one not yet, makes both go on.
+//! One such difference is a number drawn at random, and small by chance in many a pixel that is noisy. So what a
+//! pixel's tells is averaged with its neighbours', 5 x 5 by binomial weights, which are about as noisy. A path to a
+//! small bright light, too, that one pixel has found and the next one not yet, makes both go on.
 //!
-//! Errors are measured as they are seen: of the square root of the pixel, which is about what a screen shows, 1 being white. So a
-//! threshold of 0.01 means two or three steps of 255, in the dark as in the light.
+//! Errors are measured as they are seen: of the square root of the pixel, which is about what a screen shows, 1 being
+//! white. So a threshold of 0.01 means two or three steps of 255, in the dark as in the light.
 //!
-//! Pixels are judged between rounds, all of them at once, so that neither tiles nor threads decide anything. A pixel that has
-//! stopped stays so: its samples are those of a render with that many.
+//! Pixels are judged between rounds, all of them at once, so that neither tiles nor threads decide anything. A pixel
+//! that has stopped stays so: its samples are those of a render with that many.
 
 use rayon::prelude::*;
 
@@ -34,8 +35,8 @@ use crate::math::Vec4;
 /// When a picture has samples enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
-    /// Root mean square of the standard error of the pixels' square roots, above 0, over those pixels that the fewest samples leave above
-    /// it; 1 is white.
+    /// Root mean square of the standard error of the pixels' square roots, above 0, over those pixels that the fewest
+    /// samples leave above it; 1 is white.
     pub noise: f32,
     /// Samples that no pixel exceeds.
     pub max_spp: u32,
@@ -79,8 +80,9 @@ impl Adaptive {
         done >= spp.max(FEWEST)
     }
 
-    /// How many samples a pixel is to have for each unit of its deviation, so that the threshold is met: s samples for each unit leave
-    /// a pixel of deviation d with the squared error d / s. 0 where the fewest samples are enough for all.
+    /// How many samples a pixel is to have for each unit of its deviation, so that the threshold is met: s samples for
+    /// each unit leave a pixel of deviation d with the squared error d / s. 0 where the fewest samples are enough for
+    /// all.
     pub(super) fn rate(&self, spp: u32, deviations: &[f32]) -> f64 {
         let enough = self.noise * (spp.max(FEWEST) as f32).sqrt();
         // One after another, so that the sum is the same for any number of threads.
@@ -225,8 +227,8 @@ mod tests {
         assert!(deviations(3, 9, even).iter().all(|&deviation| deviation == 0.0));
     }
 
-    /// Among random numbers of samples for pixels whose deviations are known, none leaves a smaller error than those of the rate, for as
-    /// many samples in all; and the error that these leave is the threshold.
+    /// Among random numbers of samples for pixels whose deviations are known, none leaves a smaller error than those of
+    /// the rate, for as many samples in all; and the error that these leave is the threshold.
     #[test]
     fn no_other_division_is_better() {
         let adaptive = Adaptive { noise: 0.01, max_spp: u32::MAX };

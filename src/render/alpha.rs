@@ -1,12 +1,12 @@
 //! Rays through surfaces that are not all there.
 //!
-//! What is seen through a surface is chosen ray by ray: it is met as often as it covers (Enderton, Sintorn, Shirley and Luebke 2010,
-//! *Stochastic transparency*), so that no ray becomes two and every integrator sees the same. Shadow rays lose the share that is
-//! covered, and need no chance. Masks are exact in both.
+//! What is seen through a surface is chosen ray by ray: it is met as often as it covers (Enderton, Sintorn, Shirley and
+//! Luebke 2010, *Stochastic transparency*), so that no ray becomes two and every integrator sees the same. Shadow rays
+//! lose the share that is covered, and need no chance. Masks are exact in both.
 //!
 //! A ray that passes goes on from beyond the hit by its range alone: its origin stays, and so does every density that
-//! refers to it. What rounds to the same t, a decal in the plane of its wall, is passed with it; a gap keeps them apart. Scenes
-//! without such surfaces pay for none of this.
+//! refers to it. What rounds to the same t, a decal in the plane of its wall, is passed with it; a gap keeps them
+//! apart. Scenes without such surfaces pay for none of this.
 
 use crate::math::DVec2;
 use crate::ray::{Hit, Ray};
@@ -31,8 +31,8 @@ impl Renderer<'_> {
         if !self.plan.alpha {
             return;
         }
-        // Once a ray has passed with the chance c of a number above c, the rest of the number is as even as all of it was. In f64, where it
-        // stays below 1: a number that is rounded to 1 would pass what covers all.
+        // Once a ray has passed with the chance c of a number above c, the rest of the number is as even as all of it
+        // was. In f64, where it stays below 1: a number that is rounded to 1 would pass what covers all.
         let mut pending: Vec<(usize, f64)> = (0..rays.len()).map(|i| (i, xi(i).x)).collect();
         loop {
             pending.retain_mut(|(i, chance)| {
@@ -95,7 +95,8 @@ mod tests {
     use crate::trace::World;
     use crate::trace::bvh::Bvh;
 
-    /// No number that a sampler gives, the largest below 1 neither, lets a ray pass what covers all; and each passes what covers nothing.
+    /// No number that a sampler gives, the largest below 1 neither, lets a ray pass what covers all; and each passes
+    /// what covers nothing.
     #[test]
     fn masks_are_exact() {
         let sheet = |z: f32, material| {

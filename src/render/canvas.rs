@@ -1,7 +1,7 @@
 //! Every pixel of a picture that is taken in rounds, as far as it is.
 //!
-//! What is added up is kept undivided: a render that goes on adds its samples to the very sums where it left off, so that neither
-//! the rounds nor an interruption change a bit.
+//! What is added up is kept undivided: a render that goes on adds its samples to the very sums where it left off, so
+//! that neither the rounds nor an interruption change a bit.
 
 use super::Crop;
 use super::adaptive::Estimate;

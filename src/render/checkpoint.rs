@@ -1,9 +1,9 @@
 //! Long renders that are interrupted: what is known so far is written to a file now and then, and read to go on from.
 //!
-//! The file is an OpenEXR picture that any viewer shows, of the render as far as it is, with the undivided sums beside it as 32-bit
-//! channels. It is written beside its place and renamed, so that whenever the process is killed there is a whole one, the last or the
-//! one before. In the header stands what the render was of; a file of another scene, other settings, or by another program is refused,
-//! for what went on from it would be a mixture.
+//! The file is an OpenEXR picture that any viewer shows, of the render as far as it is, with the undivided sums beside
+//! it as 32-bit channels. It is written beside its place and renamed, so that whenever the process is killed there is a
+//! whole one, the last or the one before. In the header stands what the render was of; a file of another scene, other
+//! settings, or by another program is refused, for what went on from it would be a mixture.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -17,14 +17,14 @@ use crate::math::Vec4;
 
 /// How a render is kept, and gone on with.
 ///
-/// What goes wrong with the file is [`Error::Output`] where it is written; [`Error::Input`] where it is to be read and is missing,
-/// broken or of another render.
+/// What goes wrong with the file is [`Error::Output`] where it is written; [`Error::Input`] where it is to be read and
+/// is missing, broken or of another render.
 #[derive(Clone, Copy, Debug)]
 pub struct Checkpoint<'a> {
     /// The file, with the suffix `.exr`.
     pub path: &'a Path,
-    /// How often it is written, and whenever the render is interrupted; none where it is gone on from and no more. Where writing takes
-    /// long it is written less often, so that it takes a fifth of the time at most.
+    /// How often it is written, and whenever the render is interrupted; none where it is gone on from and no more.
+    /// Where writing takes long it is written less often, so that it takes a fifth of the time at most.
     pub every: Option<Duration>,
     /// Whether to go on from what it holds.
     pub resume: bool,
@@ -83,8 +83,8 @@ fn is_due(since: Duration, every: Duration, took: Duration) -> bool {
 }
 
 impl Renderer<'_> {
-    /// The canvas to go on with, which is as empty as the one given where nothing is to be resumed; the samples with which the round
-    /// begins; and what writes checkpoints.
+    /// The canvas to go on with, which is as empty as the one given where nothing is to be resumed; the samples with
+    /// which the round begins; and what writes checkpoints.
     pub(super) fn open_checkpoint<'k>(
         &self,
         checkpoint: &Checkpoint<'k>,

@@ -145,9 +145,10 @@ impl FilterSampler {
         (DVec2::new(x, y) + 0.5, a != b)
     }
 
-    /// What the samples of a pixel count of which so many lie where the filter is positive, and where it is negative. All together those of
-    /// either kind count as much as that part of the filter does, so that few samples cannot have the one outweigh the other; without any of
-    /// one kind all count alike. The weights add up to the number of samples.
+    /// What the samples of a pixel count of which so many lie where the filter is positive, and where it is negative.
+    /// All together those of either kind count as much as that part of the filter does, so that few samples cannot have
+    /// the one outweigh the other; without any of one kind all count alike. The weights add up to the number of
+    /// samples.
     pub(super) fn balance(&self, positive: u32, negative: u32) -> Balance {
         if positive == 0 || negative == 0 {
             return Balance { positive: 1.0, negative: 1.0 };
@@ -186,7 +187,8 @@ mod tests {
         }
     }
 
-    /// However many samples there are of either kind, what they count adds up, and each kind counts as its part of the filter does.
+    /// However many samples there are of either kind, what they count adds up, and each kind counts as its part of the
+    /// filter does.
     #[test]
     fn few_samples_are_balanced() {
         let sampler = FilterSampler::new(Filter::Mitchell);

@@ -1,7 +1,8 @@
-//! Fog along the rays of a picture: from the camera, mirrored, refracted and scattered ones. On the way to lights [`media`](super::media) knows of it.
+//! Fog along the rays of a picture: from the camera, mirrored, refracted and scattered ones. On the way to lights
+//! [`media`](super::media) knows of it.
 //!
-//! A ray is in the fog unless it is inside of something that refracts; which of the two is known where it ends, from the side that is seen
-//! and from what the ray entered last. Scenes without fog pay one comparison for each of these.
+//! A ray is in the fog unless it is inside of something that refracts; which of the two is known where it ends, from
+//! the side that is seen and from what the ray entered last. Scenes without fog pay one comparison for each of these.
 
 use crate::math::Vec3;
 use crate::ray::Ray;

@@ -1,7 +1,7 @@
 //! What a render is of, in words and digests: two renders with the same have the same bits.
 //!
-//! Every field of a scene and of the settings is named here, or named as what changes no pixel, so that a field that is added is not
-//! forgotten.
+//! Every field of a scene and of the settings is named here, or named as what changes no pixel, so that a field that is
+//! added is not forgotten.
 
 use std::fmt::{self, Write};
 

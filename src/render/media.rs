@@ -1,7 +1,8 @@
 //! What a path is inside of, and what that leaves of light: absorption by Beer's law, and whether there is fog.
 //!
-//! A path knows what it has entered and not left, so that behind a bubble in water there is water again. What it crosses of something thin
-//! it is not inside of. Where it ends the side that is seen tells as well, which is all there is for a camera inside of glass.
+//! A path knows what it has entered and not left, so that behind a bubble in water there is water again. What it
+//! crosses of something thin it is not inside of. Where it ends the side that is seen tells as well, which is all there
+//! is for a camera inside of glass.
 
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Absorption, Interface, Material};
@@ -41,8 +42,8 @@ impl Media {
         Self([material, a, b, c])
     }
 
-    /// Leaves the one of this material that was entered last, wherever it stands, for bodies may overlap; else, since a body may have several
-    /// materials, the one that was entered last.
+    /// Leaves the one of this material that was entered last, wherever it stands, for bodies may overlap; else, since a
+    /// body may have several materials, the one that was entered last.
     fn leave(mut self, material: u32) -> Self {
         let at = self.0.iter().position(|&known| known == material).unwrap_or(0);
         self.0.copy_within(at + 1.., at);
@@ -71,10 +72,11 @@ impl Renderer<'_> {
         }
     }
 
-    /// What fog and absorption leave of light that arrives at `point`, which the path has come to, from a light; none for all of it.
+    /// What fog and absorption leave of light that arrives at `point`, which the path has come to, from a light; none
+    /// for all of it.
     ///
-    /// Of what is absorbed only lights know that cast shadows: the surface of the body that they are outside of hides them. What comes from infinitely
-    /// far is absorbed by nothing, as where rays hit nothing.
+    /// Of what is absorbed only lights know that cast shadows: the surface of the body that they are outside of hides
+    /// them. What comes from infinitely far is absorbed by nothing, as where rays hit nothing.
     pub(super) fn light_transmittance(
         &self,
         path: &Path,

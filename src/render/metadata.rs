@@ -9,7 +9,8 @@ use crate::scene::{Camera, Fov, Pose, Projection};
 const NEAR: f64 = 0.01;
 
 impl Metadata {
-    /// What there is to say about a picture that this camera and these settings make: where the camera stands and what it sees, the samples of a pixel, and which part it is.
+    /// What there is to say about a picture that this camera and these settings make: where the camera stands and what
+    /// it sees, the samples of a pixel, and which part it is.
     pub fn of_camera(camera: &Camera, settings: &Settings) -> Self {
         let aspect = f64::from(settings.width) / f64::from(settings.height);
         // Of a camera that moves, as it is when the shutter opens.
@@ -32,8 +33,8 @@ impl Metadata {
         }
     }
 
-    /// The camera that it tells of, as exactly as the f32 of a file are; none where it tells of none. Lens, distortion and shutter are
-    /// not in it.
+    /// The camera that it tells of, as exactly as the f32 of a file are; none where it tells of none. Lens, distortion
+    /// and shutter are not in it.
     pub fn camera(&self) -> Option<Camera> {
         let to_camera = DMat4::from_cols_array(self.world_to_camera.as_ref()?);
         let from_camera = to_camera.inverse();

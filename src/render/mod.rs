@@ -64,7 +64,8 @@ use sampler::{Dimension, Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
 
-/// The most samples that are balanced between where the filter is positive and where it is negative: of more, chance has them nearly so, and to count them takes longer.
+/// The most samples that are balanced between where the filter is positive and where it is negative: of more, chance
+/// has them nearly so, and to count them takes longer.
 const MAX_BALANCED: u32 = 64;
 
 /// A scene, a camera and settings, ready to be traced by any engine.
@@ -119,9 +120,10 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`MAX_SIDE`](crate::scene::MAX_SIDE), a camera that cannot be, and settings that do not go
-    /// together: a sampler of a whole grid with adaptive sampling or paths, adaptive sampling of a part of the picture, channels that need
-    /// what is not there; and for a world that is another scene's. [`Error::Input`] where the camera is one of the scene's file.
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`MAX_SIDE`](crate::scene::MAX_SIDE), a camera
+    /// that cannot be, and settings that do not go together: a sampler of a whole grid with adaptive sampling or paths,
+    /// adaptive sampling of a part of the picture, channels that need what is not there; and for a world that is
+    /// another scene's. [`Error::Input`] where the camera is one of the scene's file.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
         let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         settings.check()?;
@@ -187,8 +189,8 @@ impl<'a> Renderer<'a> {
         self.settings.window()
     }
 
-    /// Renders the colours of the picture, or of the part of it that is asked for, on rayon's current thread pool; [`Renderer::picture`]
-    /// gives what else is asked for.
+    /// Renders the colours of the picture, or of the part of it that is asked for, on rayon's current thread pool;
+    /// [`Renderer::picture`] gives what else is asked for.
     ///
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set, and
@@ -221,8 +223,8 @@ impl<'a> Renderer<'a> {
         Ok(film.into_image())
     }
 
-    /// How many camera rays of the whole picture hit something. The same loop as [`Renderer::render`] on the same pool, from pixels
-    /// to hits, without what follows: what an engine is worth to a renderer can be measured with it.
+    /// How many camera rays of the whole picture hit something. The same loop as [`Renderer::render`] on the same pool,
+    /// from pixels to hits, without what follows: what an engine is worth to a renderer can be measured with it.
     pub fn count_hits<T: Tracer + ?Sized>(&self, tracer: &T) -> u64 {
         let sum = AtomicU64::new(0);
         self.each_tile(|tile, buffers| {
@@ -249,8 +251,8 @@ impl<'a> Renderer<'a> {
         });
     }
 
-    /// One pixel, the same to the bit as in the whole picture; of a picture with [`Settings::adaptive`], with its fewest samples. A tracer that records what it is asked learns every ray
-    /// that the pixel depends on.
+    /// One pixel, the same to the bit as in the whole picture; of a picture with [`Settings::adaptive`], with its
+    /// fewest samples. A tracer that records what it is asked learns every ray that the pixel depends on.
     ///
     /// The same to the bit holds for an engine whose answer to a ray does not depend on the batch it came in: the
     /// native ones, and Embree with [`Width::One`](crate::Width).
@@ -258,15 +260,16 @@ impl<'a> Renderer<'a> {
         self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 
-    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and whether the filter is negative there.
+    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and whether the
+    /// filter is negative there.
     #[inline]
     fn place(&self, pixel: &Pattern, sample: u32) -> (DVec2, bool) {
         let (within, is_negative) = self.filter.place(self.sampler.film(pixel, sample));
         (pixel.corner() + within, is_negative)
     }
 
-    /// What the samples of a pixel count, by a filter that is negative somewhere. Few are balanced; of many, and where it is not known how many there will be,
-    /// which then are [`adaptive`]'s sixteen at least, each counts 1 or -1.
+    /// What the samples of a pixel count, by a filter that is negative somewhere. Few are balanced; of many, and where
+    /// it is not known how many there will be, which then are [`adaptive`]'s sixteen at least, each counts 1 or -1.
     fn balance(&self, pixel: &Pattern) -> Balance {
         let Settings { spp, adaptive, .. } = self.settings;
         if adaptive.is_some() || spp > MAX_BALANCED {

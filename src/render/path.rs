@@ -1,13 +1,13 @@
-//! Path tracing (Kajiya 1986, *The rendering equation*): from each surface a ray goes on in one direction that is chosen at random, so
-//! that light is found however often it was scattered.
+//! Path tracing (Kajiya 1986, *The rendering equation*): from each surface a ray goes on in one direction that is
+//! chosen at random, so that light is found however often it was scattered.
 //!
-//! At each surface one light is asked directly, and what the ray that goes on finds glowing is weighed against that question by
-//! the power heuristic (Veach and Guibas 1995, *Optimally combining sampling techniques for Monte Carlo rendering*). Paths
-//! that matter little end by chance, and those that go on count for them (Arvo and Kirk 1990, *Particle transport and image
-//! synthesis*), so that nothing is lost on average.
+//! At each surface one light is asked directly, and what the ray that goes on finds glowing is weighed against that
+//! question by the power heuristic (Veach and Guibas 1995, *Optimally combining sampling techniques for Monte Carlo
+//! rendering*). Paths that matter little end by chance, and those that go on count for them (Arvo and Kirk
+//! 1990, *Particle transport and image synthesis*), so that nothing is lost on average.
 //!
-//! Every ray sends on one at most: a wave is never larger than the tile, and two are enough. Each depth has its own dimensions
-//! of the sampler, so that every choice is well spread over the samples of a pixel.
+//! Every ray sends on one at most: a wave is never larger than the tile, and two are enough. Each depth has its own
+//! dimensions of the sampler, so that every choice is well spread over the samples of a pixel.
 
 use std::mem;
 
@@ -245,8 +245,8 @@ impl Renderer<'_> {
         let mut throughput = path.throughput * scattered.weight;
         let eta_scale = path.eta_scale * scattered.scale;
         if *depth >= ROULETTE_MIN_DEPTH {
-            // What radiance lost on its way into glass it gains on the way out. What has lost nothing goes on: to end it now and then would
-            // make what is left worth more than there is light.
+            // What radiance lost on its way into glass it gains on the way out. What has lost nothing goes on: to end
+            // it now and then would make what is left worth more than there is light.
             let chance = (throughput.max_element() / eta_scale).min(1.0);
             if self.choice(vertex, Choice::End).x >= f64::from(chance) {
                 return None;

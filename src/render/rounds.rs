@@ -1,7 +1,8 @@
 //! Pictures that are taken in rounds: with what stands beside the colours, to a noise threshold, or with checkpoints.
 //!
-//! Between rounds all pixels are at rest, and it is decided which of them go on. Within one, each tile adds its samples to
-//! what is known of its pixels. A plain render has none of this: each tile is finished at once, and what a picture holds is its pixels alone.
+//! Between rounds all pixels are at rest, and it is decided which of them go on. Within one, each tile adds its samples
+//! to what is known of its pixels. A plain render has none of this: each tile is finished at once, and what a picture
+//! holds is its pixels alone.
 
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};

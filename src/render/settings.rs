@@ -18,7 +18,8 @@ pub struct Settings {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Samples a pixel, 1 to [`MAX_SPP`]; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel has.
+    /// Samples a pixel, 1 to [`MAX_SPP`]; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel
+    /// has.
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
@@ -38,7 +39,8 @@ pub struct Settings {
     pub light_samples: u32,
     /// How far light is followed; none for the cheapest way that shows all the scene contains.
     pub integrator: Option<Integrator>,
-    /// How often a ray may be sent on, up to [`MAX_DEPTH`]; what it would see after that is black. None is [`DEFAULT_DEPTH`](crate::plan::DEFAULT_DEPTH), for paths
+    /// How often a ray may be sent on, up to [`MAX_DEPTH`]; what it would see after that is black. None is
+    /// [`DEFAULT_DEPTH`](crate::plan::DEFAULT_DEPTH), for paths
     /// [`DEFAULT_PATH_DEPTH`](crate::plan::DEFAULT_PATH_DEPTH).
     pub max_depth: Option<u32>,
     /// The only part that is rendered; none for all of it. Its pixels are those of the whole picture.
@@ -47,8 +49,8 @@ pub struct Settings {
     pub aovs: Vec<Aov>,
     /// Takes samples where they are needed; none takes as many for each pixel.
     pub adaptive: Option<Adaptive>,
-    /// What is modelled whether the scene needs it or not; never changes a picture, but for roundings of what is placed by
-    /// transforms, what is too faint to be seen, and noise of paths.
+    /// What is modelled whether the scene needs it or not; never changes a picture, but for roundings of what is placed
+    /// by transforms, what is too faint to be seen, and noise of paths.
     pub complete: Complete,
 }
 

@@ -37,7 +37,8 @@ impl Shadows {
         self.parts.clear();
     }
 
-    /// Keeps it until the shadow rays are traced; what casts no shadows is there at once. `tally` is what light is told apart in, if it is, and by what parts.
+    /// Keeps it until the shadow rays are traced; what casts no shadows is there at once. `tally` is what light is told
+    /// apart in, if it is, and by what parts.
     #[inline]
     pub(super) fn add(&mut self, sent: &Sent<'_>, radiance: &mut [Vec4], tally: Option<(&mut Tally, Parts)>) {
         let Sent { source, arriving, point, pixel, contribution } = *sent;

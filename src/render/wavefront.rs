@@ -71,7 +71,8 @@ impl Wave {
         self.routes.clear();
     }
 
-    /// How a ray's light came from there to the eye; camera rays have none, and where light is not told apart it means nothing.
+    /// How a ray's light came from there to the eye; camera rays have none, and where light is not told apart it means
+    /// nothing.
     #[inline]
     pub(super) fn route(&self, ray: usize) -> Route {
         self.routes.get(ray).copied().unwrap_or_default()
@@ -85,13 +86,15 @@ pub(super) struct Path {
     pub(super) pixel: u32,
     /// Share of what the ray sees that reaches the pixel.
     pub(super) throughput: Vec3,
-    /// Number of the ray in the sample's tree of rays: 0 for the camera's, 2 n + 1 and 2 n + 2 for those that n sends on.
+    /// Number of the ray in the sample's tree of rays: 0 for the camera's, 2 n + 1 and 2 n + 2 for those that n sends
+    /// on.
     pub(super) branch: u32,
     /// What the ray is inside of.
     pub(super) media: Media,
     /// How densely its direction was chosen, per steradian; 0 where no other could have been.
     pub(super) pdf: f32,
-    /// By how much radiance grew where it was refracted, all in all: the product of squared relative indices of refraction.
+    /// By how much radiance grew where it was refracted, all in all: the product of squared relative indices of
+    /// refraction.
     pub(super) eta_scale: f32,
     /// How large a share of the pixel may be left out of what the ray and those that follow from it see.
     pub(super) error_budget: f32,

@@ -1,5 +1,5 @@
-//! Ray casting, and Whitted's recursion (1980, *An improved illumination model for shaded display*): at each surface every
-//! light is asked, then all rays that mirrors and glass send on are followed.
+//! Ray casting, and Whitted's recursion (1980, *An improved illumination model for shaded display*): at each surface
+//! every light is asked, then all rays that mirrors and glass send on are followed.
 //!
 //! A pixel adds up camera ray by sample, then lights in the scene's order, then the rays sent on, depth by depth.
 //!
@@ -50,8 +50,8 @@ impl Renderer<'_> {
         self.radiance(tracer, Stage { sample, depth: 0 }, 0, buffers);
     }
 
-    /// Adds what the rays that `buffers.hits` belongs to see, those of `waves[depth]` from `first` on, and follows what is
-    /// sent on from there.
+    /// Adds what the rays that `buffers.hits` belongs to see, those of `waves[depth]` from `first` on, and follows what
+    /// is sent on from there.
     fn radiance<T: Tracer + ?Sized>(&self, tracer: &T, stage: Stage, first: usize, buffers: &mut Buffers) {
         let Stage { sample, depth } = stage;
         self.shade(depth, first, buffers);
@@ -163,8 +163,8 @@ impl Renderer<'_> {
         }
     }
 
-    /// In place of rays that ray casting does not send on: what they would see if nothing but the environment were there
-    /// (Blinn and Newell 1976, *Texture and reflection in computer generated images*).
+    /// In place of rays that ray casting does not send on: what they would see if nothing but the environment were
+    /// there (Blinn and Newell 1976, *Texture and reflection in computer generated images*).
     fn fake_reflections(&self, buffers: &mut Buffers) {
         let (Integrator::RayCast, Some(environment)) = (self.plan.integrator, &self.environment) else { return };
         let Buffers { radiance, lit, tally, trail, .. } = buffers;
@@ -258,8 +258,9 @@ impl Wave {
     }
 }
 
-/// Which of two ways are followed, and what each of these may leave out: the smaller ones are not as long as they fit into what may be left out, and the rest of that is
-/// shared. So all that is left out of a tree of rays, however large, stays below what its first ray may leave out.
+/// Which of two ways are followed, and what each of these may leave out: the smaller ones are not as long as they fit
+/// into what may be left out, and the rest of that is shared. So all that is left out of a tree of rays, however large,
+/// stays below what its first ray may leave out.
 fn followed(shares: [f32; 2], error_budget: f32) -> ([bool; 2], f32) {
     let (mut is_followed, mut left) = ([true; 2], error_budget);
     let smaller = usize::from(shares[1] < shares[0]);

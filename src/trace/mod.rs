@@ -1,7 +1,7 @@
 //! Two questions, closest hit and occluded, answered by engines that know nothing of each other.
 //!
-//! A [`Tracer`] is built from a [`World`] and answers [`Hit`](crate::Hit)s. Those of our own, the [`bvh`] and what it is compared with, are the core's;
-//! Embree is here.
+//! A [`Tracer`] is built from a [`World`] and answers [`Hit`](crate::Hit)s. Those of our own, the [`bvh`] and what it
+//! is compared with, are the core's; Embree is here.
 
 #[cfg(feature = "embree")]
 pub mod embree;

@@ -1,8 +1,9 @@
 //! Every primitive on every accelerator against exact arithmetic, on rays of every class.
 //!
 //! Brute force is held against the oracle, primitive by primitive; everything else is held against brute force, to the
-//! bit. Where a primitive stands in world coordinates the oracle's verdict must be met; where it was placed by a transform, triangles are held to the same, and
-//! shapes, whose ray is rounded in their own coordinates, to what that rounding allows.
+//! bit. Where a primitive stands in world coordinates the oracle's verdict must be met; where it was placed by a
+//! transform, triangles are held to the same, and shapes, whose ray is rounded in their own coordinates, to what that
+//! rounding allows.
 
 use twincast::lab::oracle::{self, Id, Primitive};
 use twincast::lab::rounding::{Precision, outcome};

@@ -11,7 +11,8 @@ use super::matrix::{Matrix, of_kind};
 use super::subjects::{Class, Kind};
 use crate::scenes::Random;
 
-/// A textbook's method misses rays at the edges that triangles share, and the accelerator shows it; the exact one does not.
+/// A textbook's method misses rays at the edges that triangles share, and the accelerator shows it; the exact one does
+/// not.
 #[test]
 fn methods_can_be_chosen_and_show_what_they_miss() {
     // A fan of slivers around the origin, in a plane that leans; rays at points of the shared edges.
@@ -54,8 +55,8 @@ fn sphere_methods_agree_on_plain_rays() {
 /// Rays of each class on each accelerator.
 const RAYS: usize = 300;
 
-/// How often an accelerator with a method differs from exact arithmetic on rays of each class: it hits something else, or
-/// nothing, or at a t that is off by more than a thousandth.
+/// How often an accelerator with a method differs from exact arithmetic on rays of each class: it hits something else,
+/// or nothing, or at a t that is off by more than a thousandth.
 fn differing(matrix: &Matrix, rays: &[Vec<(Ray, Exact)>], accel: Accel, methods: Methods) -> Vec<usize> {
     let tracer = accel.build(&matrix.world, &Options { methods, ..Options::default() });
     let is_right = |(ray, exact): &&(Ray, Exact)| {
@@ -111,8 +112,9 @@ fn hold(kind: Kind, methods: &[(&'static str, Methods, &str)]) {
     assert_eq!(found, expected, "{kind:?}: {:?}", Class::ALL);
 }
 
-/// In the order of [`Class::ALL`]: random, inside, tangent, corner, edge, axis, zero, surface, far. A dot where the method is wrong on
-/// no accelerator, a cross where it is on every one for more than one ray in thirty, a dash between. So a method that is mended shows as well.
+/// In the order of [`Class::ALL`]: random, inside, tangent, corner, edge, axis, zero, surface, far. A dot where the
+/// method is wrong on no accelerator, a cross where it is on every one for more than one ray in thirty, a dash between.
+/// So a method that is mended shows as well.
 #[test]
 fn where_the_textbooks_methods_of_triangles_fail() {
     let row = |triangle, row| (TriangleMethod::name(triangle), Methods { triangle, ..Methods::default() }, row);

@@ -120,7 +120,8 @@ fn rays_from_far_away() {
     assert!(hits > 300, "{hits} hits");
 }
 
-/// Objects under transforms that shear, mirror, and scale to next to nothing along one axis or to a million times the size.
+/// Objects under transforms that shear, mirror, and scale to next to nothing along one axis or to a million times the
+/// size.
 #[test]
 fn odd_transforms() {
     let mut scene = scenes::instanced(11);

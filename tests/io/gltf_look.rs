@@ -12,8 +12,9 @@ use super::gltf::data_uri;
 use super::gltf_maker::Maker;
 use super::{Files, meshes, obj, refused};
 
-/// The square from (-1, -1) to (1, 1) in the plane z = 0, which faces +z, with the picture of two pixels: red and opaque, blue and half
-/// there. The first set of coordinates lies the picture over the square; by the second all of it is at the corner (1, 0), v down.
+/// The square from (-1, -1) to (1, 1) in the plane z = 0, which faces +z, with the picture of two pixels: red and
+/// opaque, blue and half there. The first set of coordinates lies the picture over the square; by the second all of it
+/// is at the corner (1, 0), v down.
 fn square(material: Value) -> Maker {
     let mut maker = Maker::new();
     let positions = maker.floats("VEC3", &[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);

@@ -1,7 +1,7 @@
 //! What glTF files keep small: quantised and compressed meshes, and many instances of one.
 //!
-//! The compressed files were made with other people's encoders: `meshopt.gltf` and `meshopt_khr.gltf` with meshoptimizer 1.3's, `draco.gltf` with
-//! draco3d 1.5.9's, all as published for JavaScript.
+//! The compressed files were made with other people's encoders: `meshopt.gltf` and `meshopt_khr.gltf` with
+//! meshoptimizer 1.3's, `draco.gltf` with draco3d 1.5.9's, all as published for JavaScript.
 
 use std::path::Path;
 

@@ -186,7 +186,8 @@ fn things_move_while_the_shutter_is_open() {
     assert_eq!(posed(&maker.files(), at(0.5)).cameras[0].eye, DVec3::X);
 }
 
-/// Three vertices on two joints: the first follows the one, the second the other, the third both by halves. Which joints weigh nothing does not matter.
+/// Three vertices on two joints: the first follows the one, the second the other, the third both by halves. Which
+/// joints weigh nothing does not matter.
 fn skinned() -> Maker {
     let mut maker = Maker::triangle();
     let joints = maker.accessor("VEC4", U8, false, 12, &[0, 0, 0, 0, 1, 200, 0, 0, 0, 1, 0, 99]);
@@ -218,8 +219,9 @@ fn skins_follow_their_joints() {
     let files = skinned().files();
     let scene = posed(&files, Animation::default());
     let mesh = meshes(&scene)[0];
-    // The first is lifted by 3. The second is at its joint, which only turns. The third, at (0, 1, 0), is lifted by the one, and by the other
-    // turned about (1, 0, 0), from (-1, 1, 0) to (-1, -1, 0) from there: the mean of (0, 1, 3) and (0, -1, 0).
+    // The first is lifted by 3. The second is at its joint, which only turns. The third, at (0, 1, 0), is lifted by the
+    // one, and by the other turned about (1, 0, 0), from (-1, 1, 0) to (-1, -1, 0) from there: the mean of (0, 1, 3)
+    // and (0, -1, 0).
     let expected = [[0., 0., 3.], [1., 0., 0.], [0., 0., 1.5]];
     for (got, expected) in corners(mesh)[0].iter().zip(expected) {
         let got = got.as_dvec3() + mesh.origin;
@@ -231,7 +233,8 @@ fn skins_follow_their_joints() {
     assert_eq!(scene.instances[0].transform, twincast::math::DAffine3::IDENTITY, "its own place does not count");
 }
 
-/// Its node's place does not matter to a skinned mesh, but whether that is mirrored decides which side of a triangle is its front.
+/// Its node's place does not matter to a skinned mesh, but whether that is mirrored decides which side of a triangle is
+/// its front.
 #[test]
 fn skins_of_mirrored_nodes_keep_their_front() {
     let order = |scale: [f64; 3]| {
@@ -358,8 +361,8 @@ fn nodes_share_a_shape_where_it_is_the_same() {
     assert_eq!((groups, scene.geometries.len()), (vec![0, 0, 1], 2));
 }
 
-/// The tutorial's skin (Khronos Group, *glTF tutorial*): ten vertices, the upper ones turned about (0, 1, 0), by 90 degrees after one second
-/// in their upper half.
+/// The tutorial's skin (Khronos Group, *glTF tutorial*): ten vertices, the upper ones turned about (0, 1, 0), by 90
+/// degrees after one second in their upper half.
 #[test]
 fn the_tutorials_skin_bends() {
     let Some(path) = model("gltf/SimpleSkin.gltf") else { return };

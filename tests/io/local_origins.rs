@@ -112,7 +112,8 @@ fn distances(scene: &Scene, Writer { place, size }: Writer, time: f32) -> Vec<Me
     found
 }
 
-/// Whether both are hit alike: within the tolerance across the surface, so that along a ray that grazes it there is more.
+/// Whether both are hit alike: within the tolerance across the surface, so that along a ray that grazes it there is
+/// more.
 #[track_caller]
 fn assert_alike(what: &str, found: &[Met], expected: &[Met], tolerance: f64) {
     assert!(expected.iter().flatten().count() > 10, "{what}: too few hits");

@@ -221,7 +221,8 @@ fn suffixes_are_known_in_any_case() {
     assert_eq!(Files::one("a.OBJ", TRIANGLE).scene("a.OBJ").primitive_count(), 1);
 }
 
-/// Files of Windows end their lines in `\r\n`, of the old Macintosh in `\r`: both hold the same scene, and what is wrong is in the same line.
+/// Files of Windows end their lines in `\r\n`, of the old Macintosh in `\r`: both hold the same scene, and what is
+/// wrong is in the same line.
 #[test]
 fn lines_end_in_any_way() {
     let ply = "ply\nformat ascii 1.0\ncomment \\\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\

@@ -92,8 +92,8 @@ fn smoothing_groups() {
     assert_eq!(mixed, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO]);
 }
 
-/// Slips that other readers pass over: a comment behind fewer numbers than there may be, a map without a name, a comment that ends in a
-/// path of Windows, and libraries that have nothing of what is named.
+/// Slips that other readers pass over: a comment behind fewer numbers than there may be, a map without a name, a
+/// comment that ends in a path of Windows, and libraries that have nothing of what is named.
 #[test]
 fn slips_cost_no_more_than_what_they_are() {
     let obj = format!("# C:\\models\\\n{VERTICES}mtllib a.mtl\nvt 0.5 # c\nusemtl red\nf 1/1 2/1 3/1\n");
@@ -146,7 +146,8 @@ fn materials_and_textures() {
     assert_eq!(shapes, [("left", 0, 2), ("left", 1, 1)]);
 }
 
-/// What exporters write beside a `Ks` that none of them shows: MeshLab 0, trimesh 1, Blender's physical materials nothing but a roughness.
+/// What exporters write beside a `Ks` that none of them shows: MeshLab 0, trimesh 1, Blender's physical materials
+/// nothing but a roughness.
 #[test]
 fn highlights_without_an_edge_are_none() {
     let of = |lines: &str| {
@@ -341,8 +342,8 @@ fn textures_in_other_formats_are_left_out() {
     }
 }
 
-/// BMP and Targa, from the top and from the bottom, with a palette and with runs: two pixels a row, red and green above blue and a white that is half transparent
-/// where the format has that.
+/// BMP and Targa, from the top and from the bottom, with a palette and with runs: two pixels a row, red and green above
+/// blue and a white that is half transparent where the format has that.
 #[test]
 fn textures_in_bmp_and_targa() {
     let bmp = [

@@ -1,4 +1,5 @@
-//! Very many placements and primitives in a `.toml` scene, which are read in pieces: what arrives, and where faults are told.
+//! Very many placements and primitives in a `.toml` scene, which are read in pieces: what arrives, and where faults are
+//! told.
 
 use std::fmt::Write;
 

@@ -105,8 +105,8 @@ fn a_texture_that_a_comment_names() {
     }
 }
 
-/// Faces over two squares side by side, in the three encodings: their corners, and the values of the properties that are
-/// declared. Vertices may have properties that are bytes, which are 200.
+/// Faces over two squares side by side, in the three encodings: their corners, and the values of the properties that
+/// are declared. Vertices may have properties that are bytes, which are 200.
 fn with_faces(comments: &str, of_vertex: &str, of_face: &str, faces: [(&[u32], &[Value]); 3]) -> [Vec<u8>; 3] {
     let vertices = [[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [2.0, 0.0], [2.0, 1.0]];
     let mut values = Vec::new();

@@ -248,8 +248,8 @@ fn materials_keep_their_names() {
     assert_eq!(found, ["a.b", "m1", "m1_", "m3", "red \"1\""]);
 }
 
-/// What a scene file refuses is not written: of surfaces that show their colour as it is, of thin glass, of a view of the
-/// whole sphere, and a name twice.
+/// What a scene file refuses is not written: of surfaces that show their colour as it is, of thin glass, of a view of
+/// the whole sphere, and a name twice.
 #[test]
 fn what_is_saved_is_read_again() {
     let unlit =

@@ -18,7 +18,8 @@ fn volumes<R: Ring>(origin: &Vector<R>, d: &Vector<R>, corners: &[Vector<R>; 3])
     [dot(d, &cross(&p[1], &p[2])), dot(d, &cross(&p[2], &p[0])), dot(d, &cross(&p[0], &p[1]))]
 }
 
-/// How the rule applies to one ray: ids and t of the crossings, and how many triangles it touches on an edge or in a corner.
+/// How the rule applies to one ray: ids and t of the crossings, and how many triangles it touches on an edge or in a
+/// corner.
 fn crossings(triangles: &[Triangle], ray: &Ray) -> (BTreeMap<Id, f64>, usize) {
     // The infinitesimal, as a number: far below whatever products of the tests' coordinates are multiples of.
     let tiny = Dyadic::from_f64(2f64.powi(-900));

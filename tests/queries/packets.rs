@@ -9,7 +9,8 @@ use twincast::{Hit, Ray, Tracer, World};
 use super::{closest_triangle, grid_sphere};
 use crate::scenes::{Random, soup};
 
-/// Spheres whose corners are exact, a copy of one with its faces in another order and turned, and triangles without order.
+/// Spheres whose corners are exact, a copy of one with its faces in another order and turned, and triangles without
+/// order.
 fn world() -> (World, Vec<Vec3>) {
     let sphere = grid_sphere(9, 1);
     let larger: Vec<Vec3> = sphere.positions.iter().map(|&p| p * 2.0).collect();
@@ -158,7 +159,8 @@ fn packets_meet_what_single_rays_and_brute_force_meet() {
     assert!(hit_count > 5000, "{hit_count} hits");
 }
 
-/// Both ends of a range belong to it: whoever rounds either of them inwards loses these hits. At 0, no slack that is relative helps.
+/// Both ends of a range belong to it: whoever rounds either of them inwards loses these hits. At 0, no slack that is
+/// relative helps.
 #[test]
 fn packets_meet_what_lies_at_the_ends_of_their_ranges() {
     let (world, corners) = world();

@@ -34,7 +34,8 @@ struct Case {
     traced: Vec<PreciseRay>,
 }
 
-/// Triangles and rays on a grid, among them some that coincide and rays through corners and along axes, then placed far away and scaled.
+/// Triangles and rays on a grid, among them some that coincide and rays through corners and along axes, then placed far
+/// away and scaled.
 fn case(random: &mut Random, away: i64, scale: f64) -> Case {
     case_beside(random, away, scale, &[])
 }
@@ -79,7 +80,8 @@ fn case_beside(random: &mut Random, away: i64, scale: f64, others: &[[Whole; 3]]
 #[test]
 fn every_hit_is_that_of_exact_arithmetic() {
     let mut random = Random::new(5);
-    // Triangles that reach far beyond the others, beside and between them, and leave these in a corner of what is traced.
+    // Triangles that reach far beyond the others, beside and between them, and leave these in a corner of what is
+    // traced.
     let far = |size: i128| {
         let wall = |x: i128| [[x, -size, -size / 7], [x, 3 * size, size / 5], [x + 1, size / 3, 5 * size]];
         let turned = |[x, y, z]: Whole| [z, x, y];
@@ -149,7 +151,8 @@ fn every_hit_is_that_of_exact_arithmetic() {
     }
 }
 
-/// A range that ends just before the first hit has none of it; one that ends there or behind, or begins there, names it.
+/// A range that ends just before the first hit has none of it; one that ends there or behind, or begins there, names
+/// it.
 #[test]
 fn names_are_those_of_hits_within_the_range() {
     let mut random = Random::new(7);
@@ -325,7 +328,8 @@ fn nothing_is_within_a_clearance() {
         let nearest = precise.closest_point(point).expect("there are triangles");
         let clearance = precise.clearance(point, nearest.distance_squared);
         assert_eq!(precise.clearance(point, f64::NAN), 0.0);
-        // The ball is no larger than to that point, no smaller than rounding asks for, and none of the tetrahedron's own points is in it.
+        // The ball is no larger than to that point, no smaller than rounding asks for, and none of the tetrahedron's
+        // own points is in it.
         let distance = (nearest.point - point).length();
         assert!(clearance <= distance && clearance >= distance * (1.0 - 1e-9) - 1e-11, "{clearance}, {distance}");
         for [a, b, c] in &sides {
@@ -337,7 +341,8 @@ fn nothing_is_within_a_clearance() {
     }
 }
 
-/// Of triangles that a mesh holds twice, in the same winding, the first counts; flipped ones and those of another mesh count for themselves.
+/// Of triangles that a mesh holds twice, in the same winding, the first counts; flipped ones and those of another mesh
+/// count for themselves.
 #[test]
 fn repeats_are_left_out_of_what_is_distinct() {
     let whole = tetrahedron();

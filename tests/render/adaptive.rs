@@ -73,8 +73,8 @@ fn room() -> Scene {
     twincast::io::load(path.as_ref(), &twincast::io::LoadOptions::default()).expect("the project's scenes load").0
 }
 
-/// Compared with as many samples for each pixel, or a few more: far better where little of the picture is noisy, and better even where all of
-/// it is.
+/// Compared with as many samples for each pixel, or a few more: far better where little of the picture is noisy, and
+/// better even where all of it is.
 #[test]
 fn as_many_samples_buy_less_error() {
     let small = under_a_lamp(0.1, DVec3::new(0.4, 0.2, 0.0));
@@ -122,7 +122,8 @@ fn the_error_is_what_was_asked_for_with_far_fewer_samples() {
     }
 }
 
-/// A render to a threshold that nothing reaches is one with the most samples, to the bit; and no more are taken than that.
+/// A render to a threshold that nothing reaches is one with the most samples, to the bit; and no more are taken than
+/// that.
 #[test]
 fn the_most_samples_are_those_of_a_plain_render() {
     let scene = busier_scene();

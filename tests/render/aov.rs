@@ -1,4 +1,5 @@
-//! What a render tells of each pixel beside its colour: against rays that are cast by hand, against sums and closed forms.
+//! What a render tells of each pixel beside its colour: against rays that are cast by hand, against sums and closed
+//! forms.
 
 use std::collections::BTreeMap;
 
@@ -232,8 +233,8 @@ fn light_by_its_paths_sums_up_to_the_picture() {
     }
 }
 
-/// With lights that no path finds by chance, what is scattered once is the picture of a render that stops there, and each lobe's
-/// part that of a material with this lobe alone.
+/// With lights that no path finds by chance, what is scattered once is the picture of a render that stops there, and
+/// each lobe's part that of a material with this lobe alone.
 #[test]
 fn kinds_of_light_are_pictures_of_their_own() {
     let shiny = Material { specular: Vec3::splat(0.4), shininess: 8.0, ..matte(0.6) };
@@ -263,8 +264,8 @@ fn kinds_of_light_are_pictures_of_their_own() {
     }
 }
 
-/// Under light from everywhere each lobe sends on its own share, however its directions were proposed: known of Lambert's, and of
-/// the rest by rendering it alone.
+/// Under light from everywhere each lobe sends on its own share, however its directions were proposed: known of
+/// Lambert's, and of the rest by rendering it alone.
 #[test]
 fn lobes_that_overlap_get_what_is_theirs() {
     let both = Material {

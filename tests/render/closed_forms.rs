@@ -1,5 +1,5 @@
-//! Pictures of scenes whose every pixel has a formula: how light weakens, how wide shadows and blurs are. Furnaces, form factors and caustics
-//! are in `transport`, Fresnel's equations in `glass`, the rays of lenses in `camera`.
+//! Pictures of scenes whose every pixel has a formula: how light weakens, how wide shadows and blurs are. Furnaces,
+//! form factors and caustics are in `transport`, Fresnel's equations in `glass`, the rays of lenses in `camera`.
 
 use twincast::math::{DVec3, Vec3, Vec4};
 use twincast::render::{Filter, Sampling};
@@ -21,8 +21,8 @@ fn by(integrator: Integrator, settings: Settings) -> Settings {
     Settings { integrator: Some(integrator), max_depth: Some(0), ..settings }
 }
 
-/// E = I cos(a) / d^2 (Lambert 1760, *Photometria*), for lamps without extent and, by the form factor of a ball, pi L (r / d)^2, for
-/// one that has some: under a lamp at twice the distance it is a quarter as bright.
+/// E = I cos(a) / d^2 (Lambert 1760, *Photometria*), for lamps without extent and, by the form factor of a ball, pi L
+/// (r / d)^2, for one that has some: under a lamp at twice the distance it is a quarter as bright.
 #[test]
 fn light_weakens_with_the_square_of_the_distance() {
     let aside = DVec3::new(2.0, 0.0, 2.0);
@@ -61,8 +61,9 @@ fn light_weakens_with_the_square_of_the_distance() {
     }
 }
 
-/// An edge at height h below a ball of light of radius r whose middle is D above the edge: the planes through the edge that
-/// touch the ball lean by asin(r / D), so that the penumbra is 2 h tan asin(r / D) wide, and half as bright in its middle.
+/// An edge at height h below a ball of light of radius r whose middle is D above the edge: the planes through the edge
+/// that touch the ball lean by asin(r / D), so that the penumbra is 2 h tan asin(r / D) wide, and half as bright in its
+/// middle.
 #[test]
 fn penumbras_are_as_wide_as_tangents_have_it() {
     let (h, d) = (1.0f64, 4.0f64);
@@ -95,9 +96,9 @@ fn penumbras_are_as_wide_as_tangents_have_it() {
     }
 }
 
-/// A ball of light of radius p at distance d from a lens of radius R that is focussed at f: in the plane of focus its picture is a disk of
-/// radius R |f - d| / d + p f / d (similar triangles; Potmesil and Chakravarty 1981, *A lens and aperture camera model*), and from its
-/// middle the share (p f / (R |f - d|))^2 of the lens sees it.
+/// A ball of light of radius p at distance d from a lens of radius R that is focussed at f: in the plane of focus its
+/// picture is a disk of radius R |f - d| / d + p f / d (similar triangles; Potmesil and Chakravarty 1981, *A lens and
+/// aperture camera model*), and from its middle the share (p f / (R |f - d|))^2 of the lens sees it.
 #[test]
 fn a_point_out_of_focus_becomes_a_disk() {
     let (lens, focus, size) = (0.2f64, 5.0f64, 100u32);
@@ -137,8 +138,8 @@ fn a_point_out_of_focus_becomes_a_disk() {
     }
 }
 
-/// What is alike everywhere stays so by every filter, with however few samples; and what is black and white goes beyond either by no more than the filter's
-/// negative lobes weigh.
+/// What is alike everywhere stays so by every filter, with however few samples; and what is black and white goes beyond
+/// either by no more than the filter's negative lobes weigh.
 #[test]
 fn few_samples_keep_what_is_even_and_stay_near_what_is_there() {
     let white = Material { unlit: true, diffuse: Vec3::ONE, ..Material::default() };

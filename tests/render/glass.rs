@@ -124,8 +124,8 @@ fn a_thin_pane_lets_light_straight_through() {
     }
 }
 
-/// Straight above ground whose mirror spreads by cos^n, half of the sphere is red: all of it. At 60 degrees a part of the
-/// lobe is lost below the ground, which is counted by hand.
+/// Straight above ground whose mirror spreads by cos^n, half of the sphere is red: all of it. At 60 degrees a part of
+/// the lobe is lost below the ground, which is counted by hand.
 #[test]
 fn gloss_spreads_by_its_exponent() {
     let n = 4.0;

@@ -71,7 +71,8 @@ fn light_from_lamps_in_water_is_absorbed() {
     assert!((asked / found - 1.0).abs() < 0.03, "{asked} asked, {found} found");
 }
 
-/// The headlight is where the eye is: how far away in the air is nothing to the water, whose way to the eye counts alone.
+/// The headlight is where the eye is: how far away in the air is nothing to the water, whose way to the eye counts
+/// alone.
 #[test]
 fn the_headlight_is_not_absorbed() {
     let white = Material { diffuse: Vec3::ONE, ambient: Vec3::ZERO, specular: Vec3::ZERO, ..Material::default() };
@@ -82,7 +83,8 @@ fn the_headlight_is_not_absorbed() {
     }
 }
 
-/// Through frosted ink a lamp is seen that is in the air behind it, where nothing is absorbed; whether it is asked, or found.
+/// Through frosted ink a lamp is seen that is in the air behind it, where nothing is absorbed; whether it is asked, or
+/// found.
 #[test]
 fn a_lamp_behind_frosted_ink_is_in_the_air() {
     let glow = Material { emission: Vec3::ONE, diffuse: Vec3::ZERO, ambient: Vec3::ZERO, ..Material::default() };
@@ -133,8 +135,9 @@ fn what_is_in_water_does_not_end_it() {
     }
 }
 
-/// Of a thin sheet of something large, rays start a millionth of its size within: the way of the light is the whole one nevertheless. Against what Fresnel's equations
-/// leave at both faces, however often light goes to and fro between them.
+/// Of a thin sheet of something large, rays start a millionth of its size within: the way of the light is the whole one
+/// nevertheless. Against what Fresnel's equations leave at both faces, however often light goes to and fro between
+/// them.
 #[test]
 fn thin_sheets_of_large_bodies_absorb() {
     for (half, thick) in [(1.0, 0.01f32), (10.0, 0.001), (100.0, 0.01)] {

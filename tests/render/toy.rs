@@ -71,8 +71,8 @@ impl<'a> Local<'a> {
     }
 }
 
-/// By areas: the three signed volumes that the ray spans with the edges. Corners are as seen from its origin. Without arrays that are mapped: the closures were
-/// called, and took half of the time of all tests of pictures.
+/// By areas: the three signed volumes that the ray spans with the edges. Corners are as seen from its origin. Without
+/// arrays that are mapped: the closures were called, and took half of the time of all tests of pictures.
 fn triangle(direction: DVec3, a: DVec3, b: DVec3, c: DVec3) -> Option<f64> {
     let (of_a, of_b, of_c) = (direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a)));
     let inside = (of_a >= 0.0 && of_b >= 0.0 && of_c >= 0.0) || (of_a <= 0.0 && of_b <= 0.0 && of_c <= 0.0);

@@ -51,8 +51,8 @@ fn means(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec<(&'static s
     means
 }
 
-/// A ball that glows shows what it sends out and no more, whatever it is made of: it is convex, and nothing of it lights it, be it a lamp by itself, in the
-/// place of one, or turned and scaled.
+/// A ball that glows shows what it sends out and no more, whatever it is made of: it is convex, and nothing of it
+/// lights it, be it a lamp by itself, in the place of one, or turned and scaled.
 #[test]
 fn a_glowing_ball_does_not_light_itself() {
     let lamp = Material { emission: Vec3::splat(3.0), ..matte(0.8) };
@@ -82,7 +82,8 @@ fn a_glowing_ball_does_not_light_itself() {
     }
 }
 
-/// Howell's B-3: what a square metre above an element, from the place over it to (a, b), at distance 1, sends it, as a share of all.
+/// Howell's B-3: what a square metre above an element, from the place over it to (a, b), at distance 1, sends it, as a
+/// share of all.
 fn over_corner(a: f64, b: f64) -> f64 {
     let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
     (a / p * (b / p).atan() + b / q * (a / q).atan()) / std::f64::consts::TAU
@@ -105,8 +106,9 @@ fn faceted_ball(rings: u32) -> Mesh {
     Mesh { normals: positions.clone(), ..Mesh::new(positions, triangles.collect()) }
 }
 
-/// A room whose walls are all as bright: whatever is convex and matte in it shows its albedo, however its facets are smoothed. Walls that are asked, and found
-/// by chance, are both near, so that a point that is another for one of the two would be seen.
+/// A room whose walls are all as bright: whatever is convex and matte in it shows its albedo, however its facets are
+/// smoothed. Walls that are asked, and found by chance, are both near, so that a point that is another for one of the
+/// two would be seen.
 #[test]
 fn the_two_ways_to_a_near_light_add_up_to_one_on_smooth_facets() {
     let walls = Geometry::Shapes {
@@ -189,7 +191,8 @@ fn what_cannot_be_seen_is_not_mirrored() {
             }
         }
     }
-    // With a lamp around it, it can be seen: half of it is mirrored, with the lobe's density where it is highest, pi 11 / (2 pi).
+    // With a lamp around it, it can be seen: half of it is mirrored, with the lobe's density where it is highest, pi 11
+    // / (2 pi).
     let Light::Point { position, color, attenuation, range, .. } = point else { unreachable!() };
     let lamp = Light::Point { position, color, attenuation, range, radius: 0.1 };
     let ground = Geometry::Shapes { shapes: vec![Plane::new(Vec3::ZERO, Vec3::Y).unwrap().into()], material: 0 };
@@ -222,9 +225,10 @@ fn a_furnace_glows_evenly() {
     }
 }
 
-/// The share of even light that a highlight of exponent `n` sends to a viewer at so large a cosine to the normal, by quadrature over the hemisphere:
-/// Phong's base is the mirrored light's cosine to the viewer, Blinn's that of the half vector to the normal. `normalized`: with the factor that conserves
-/// energy (Lafortune, Willems 1994; Blinn-Phong after Giesen 2009), and the cosine of the light.
+/// The share of even light that a highlight of exponent `n` sends to a viewer at so large a cosine to the normal, by
+/// quadrature over the hemisphere: Phong's base is the mirrored light's cosine to the viewer, Blinn's that of the half
+/// vector to the normal. `normalized`: with the factor that conserves energy (Lafortune, Willems 1994; Blinn-Phong
+/// after Giesen 2009), and the cosine of the light.
 fn highlight_share(model: Specular, n: f64, normalized: bool, to_viewer: f64) -> f64 {
     const RINGS: i32 = 100;
     let viewer = DVec3::new((1.0 - to_viewer * to_viewer).sqrt(), 0.0, to_viewer);
@@ -248,7 +252,8 @@ fn highlight_share(model: Specular, n: f64, normalized: bool, to_viewer: f64) ->
     2.0 * factor * sum / f64::from(RINGS * RINGS)
 }
 
-/// What surrounds everything with 1 shows 1 in whatever loses nothing, of highlights as much as their formula says, and never more.
+/// What surrounds everything with 1 shows 1 in whatever loses nothing, of highlights as much as their formula says, and
+/// never more.
 #[test]
 fn a_white_world_shows_what_materials_lose() {
     let plain = |diffuse: f32, specular: f32, shininess: f32, model| Material {
@@ -340,8 +345,8 @@ fn a_white_world_shows_what_materials_lose() {
     }
 }
 
-/// A ball of radiance L and radius r, d above a floor of reflectance a, shows a L (r / d)^2 below it (Howell, B-17): the
-/// inverse square law, exact even close by.
+/// A ball of radiance L and radius r, d above a floor of reflectance a, shows a L (r / d)^2 below it (Howell, B-17):
+/// the inverse square law, exact even close by.
 #[test]
 fn a_ball_of_light_has_its_form_factor() {
     let below = Camera::look_at(DVec3::new(4.0, 1.0, 0.0), DVec3::ZERO, DVec3::Y, 1e-3).unwrap();
@@ -358,8 +363,8 @@ fn a_ball_of_light_has_its_form_factor() {
     }
 }
 
-/// A ball of glass brings light from far away together at n R / (2 (n - 1)) from its middle. There, through a hole of radius h, a source
-/// that fills its image shows T L sin^2 a, sin a = h / f; beside the image it is dark.
+/// A ball of glass brings light from far away together at n R / (2 (n - 1)) from its middle. There, through a hole of
+/// radius h, a source that fills its image shows T L sin^2 a, sin a = h / f; beside the image it is dark.
 #[test]
 fn a_ball_of_glass_has_its_focus() {
     let (n, hole, focus) = (1.5f32, 0.25f32, 1.5f32);
@@ -535,7 +540,8 @@ fn absorption_is_scaled_with_the_scene() {
     assert_eq!(scene.materials[0].absorption.map(|absorption| absorption.distance), Some(0.5));
 }
 
-/// Between mirrors that lose nothing no path shows more than there is, however often it was sent on: what Whitted's rays see, to rounding.
+/// Between mirrors that lose nothing no path shows more than there is, however often it was sent on: what Whitted's
+/// rays see, to rounding.
 #[test]
 fn mirrors_that_lose_nothing_show_what_there_is() {
     let mirror = Material { reflection: Vec3::ONE, ..black() };

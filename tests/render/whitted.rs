@@ -53,7 +53,8 @@ fn two_mirrors_make_a_geometric_series() {
     }
 }
 
-/// As often as a ray may be sent on at all, the stack has room: each mirror adds what it gives off, for it reflects all. More is refused.
+/// As often as a ray may be sent on at all, the stack has room: each mirror adds what it gives off, for it reflects
+/// all. More is refused.
 #[test]
 fn rays_are_sent_on_as_often_as_can_be_asked_for() {
     let mirror = Material { emission: Vec3::new(0.25, 0.5, 1.0), reflection: Vec3::ONE, ..black() };
@@ -126,9 +127,9 @@ fn a_lamp_does_not_shade_itself() {
     assert_eq!(pixel(&shaded, &from_above(), &deep(0)), Vec4::W);
 }
 
-/// Rays that double at every surface, to more than are followed at once: still each pixel as if it were alone. No two of
-/// a pixel's rays weigh the same, so that sums show their order; pixels lose rays at the rims of the disks, so that they
-/// differ in number.
+/// Rays that double at every surface, to more than are followed at once: still each pixel as if it were alone. No two
+/// of a pixel's rays weigh the same, so that sums show their order; pixels lose rays at the rims of the disks, so that
+/// they differ in number.
 #[test]
 fn a_flood_of_rays_is_followed_to_its_end() {
     let doubling = Material {

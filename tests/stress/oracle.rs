@@ -10,7 +10,8 @@ use twincast::{Ray, World};
 
 use crate::scenes::Random;
 
-/// The tree and its filter against every primitive met exactly, on the catalogue's own scenes and rays, and on aimed ones.
+/// The tree and its filter against every primitive met exactly, on the catalogue's own scenes and rays, and on aimed
+/// ones.
 #[test]
 fn the_tree_loses_nothing() {
     let (mut hits, mut ties, mut touching) = (0, 0, 0);

@@ -43,7 +43,8 @@ fn scene(faces: &[[DVec3; 3]], sphere: Option<Sphere>) -> Scene {
     Scene::from_geometries(geometries, vec![Material::default()])
 }
 
-/// From a convex surface, outwards: everything is free but for a plate 20 millionths of the size away, which hides it all. Farther from zero f32 itself moves the plate by a tenth of that.
+/// From a convex surface, outwards: everything is free but for a plate 20 millionths of the size away, which hides it
+/// all. Farther from zero f32 itself moves the plate by a tenth of that.
 #[test]
 fn nothing_is_met_again_and_nothing_near_is_passed() {
     let mut random = Random::new(1, 0);
@@ -163,8 +164,8 @@ fn wrongly_dark(attributes: Attributes) -> f64 {
     f64::from(dark) / f64::from(seen)
 }
 
-/// Shadows end where the light does on the smooth surface (Hanika 2021, *Hacking the shadow terminator*), and do not where rays
-/// leave from the facets.
+/// Shadows end where the light does on the smooth surface (Hanika 2021, *Hacking the shadow terminator*), and do not
+/// where rays leave from the facets.
 #[test]
 fn the_shadow_terminator_is_that_of_the_smooth_surface() {
     let (smooth, faceted) = (wrongly_dark(Attributes::ALL), wrongly_dark(Attributes::default()));

@@ -1,13 +1,14 @@
-//! How different two pictures look to someone who flips between them: LDR-FLIP (Andersson et al. 2020, *FLIP: A difference evaluator for
-//! alternating images*).
+//! How different two pictures look to someone who flips between them: LDR-FLIP (Andersson et al. 2020, *FLIP: A
+//! difference evaluator for alternating images*).
 //!
-//! Colours are compared after the eye's contrast sensitivity has blurred them, in a space where equal distances look equally large;
-//! edges and points that one picture has and the other lacks make the difference larger. 0 is the same, 1 the largest difference there
-//! is. Root mean square errors, the simpler alternative, count a speck that everyone sees like noise that no one does.
+//! Colours are compared after the eye's contrast sensitivity has blurred them, in a space where equal distances look
+//! equally large; edges and points that one picture has and the other lacks make the difference larger. 0 is the same,
+//! 1 the largest difference there is. Root mean square errors, the simpler alternative, count a speck that everyone
+//! sees like noise that no one does.
 //!
-//! Light is clamped to 0 .. 1, as a screen shows it; further [`Response`](super::Response) is the caller's. All filters are products of
-//! one across and one down, or sums of such products, and are applied so: some 300 products a pixel, where the squares of weights, as the
-//! paper has them, take 3000.
+//! Light is clamped to 0 .. 1, as a screen shows it; further [`Response`](super::Response) is the caller's. All filters
+//! are products of one across and one down, or sums of such products, and are applied so: some 300 products a pixel,
+//! where the squares of weights, as the paper has them, take 3000.
 
 use rayon::prelude::*;
 
@@ -16,7 +17,8 @@ use super::compare::{Extent, check_extents};
 use crate::error::{Error, Result};
 use crate::math::Vec4;
 
-/// Pixels in a degree of the field of view, for who sits 0.7 m before a screen 0.7 m wide with 3840 pixels, as the paper has it.
+/// Pixels in a degree of the field of view, for who sits 0.7 m before a screen 0.7 m wide with 3840 pixels, as the
+/// paper has it.
 pub const PIXELS_PER_DEGREE: f64 = 0.7 * (3840.0 / 0.7) * std::f64::consts::PI / 180.0;
 
 /// Three numbers of a pixel, in whichever space.
@@ -32,7 +34,8 @@ const BEND_AT: f64 = 0.95;
 /// The width of an edge or a point, in degrees.
 const FEATURE_WIDTH: f64 = 0.082;
 
-/// Contrast sensitivity of achromatic, red-green and blue-yellow: Gaussians by weight and width (Movshon and Kiorpes 1988; Mullen 1985).
+/// Contrast sensitivity of achromatic, red-green and blue-yellow: Gaussians by weight and width (Movshon and Kiorpes
+/// 1988; Mullen 1985).
 const SENSITIVITY: [&[(f64, f64)]; 3] = [&[(1.0, 0.0047)], &[(1.0, 0.0053)], &[(34.1, 0.04), (13.5, 0.025)]];
 
 /// XYZ of linear Rec. 709 light, row by row.
@@ -275,8 +278,8 @@ mod tests {
 
     #[test]
     fn means_are_those_of_the_authors_program() {
-        // By flip-evaluator 1.7 of Andersson et al. It computes in f32, in which features that are equal differ by 1e-7, of which it then takes
-        // the root.
+        // By flip-evaluator 1.7 of Andersson et al. It computes in f32, in which features that are equal differ by
+        // 1e-7, of which it then takes the root.
         let of = |color: &dyn Fn(u32, u32) -> [f32; 3]| picture(40, 30, color);
         let ramp = |x: u32, y: u32| [x as f32 / 64.0, y as f32 / 32.0, (x + y) as f32 / 128.0];
         let dots =

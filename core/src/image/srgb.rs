@@ -1,4 +1,5 @@
-//! The sRGB transfer function (IEC 61966-2-1:1999): between linear light and the codes that files hold, of 8 or 16 bits.
+//! The sRGB transfer function (IEC 61966-2-1:1999): between linear light and the codes that files hold, of 8 or 16
+//! bits.
 //!
 //! The piecewise function itself, not the power 2.2 that is often put in its place: that is off by as much as 8 of 255
 //! in the shadows. Powers come from the libm crate, so that files are the same on every machine.

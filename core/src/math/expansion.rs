@@ -3,9 +3,10 @@
 //!
 //! An [`Expansion`] is a sum of f64 components that do not overlap, smallest first. Sums and products of expansions are
 //! exact while nothing overflows or underflows; with f32 inputs and products of up to five factors nothing does. The
-//! first components live in place and single ones are added and multiplied as such, since most of what decides a hit has
-//! few: a half to three quarters of the time that a `Vec` and the general rule take. Rationals over big integers, the simpler alternative, would cost ten times as much;
-//! integers that fit into 128 bits, as those of most triangles do, a fifth.
+//! first components live in place and single ones are added and multiplied as such, since most of what decides a hit
+//! has few: a half to three quarters of the time that a `Vec` and the general rule take. Rationals over big integers,
+//! the simpler alternative, would cost ten times as much; integers that fit into 128 bits, as those of most triangles
+//! do, a fifth.
 
 use std::ops::{Add, Mul, Neg, Sub};
 use std::sync::atomic::{AtomicU64, Ordering};

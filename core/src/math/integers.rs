@@ -1,24 +1,27 @@
 //! A ray's line, and points, as integers: exact arithmetic where numbers have few digits.
 //!
-//! A float is an integer times a power of two. Along each axis all coordinates are multiples of the least power of any of them, and
-//! differences of f32 of like sizes have 25 bits or a few more; a signed volume of three of them, or of a direction and two, is a sum of six products, which i128 holds
-//! where the bits of the factors come to 122. So it is for nearly all that is decided exactly: rays through the corners of a grid or of a
-//! scan. What is left goes to an [`Expansion`](super::expansion::Expansion), which takes five times as long.
+//! A float is an integer times a power of two. Along each axis all coordinates are multiples of the least power of any
+//! of them, and differences of f32 of like sizes have 25 bits or a few more; a signed volume of three of them, or of a
+//! direction and two, is a sum of six products, which i128 holds where the bits of the factors come to 122. So it is
+//! for nearly all that is decided exactly: rays through the corners of a grid or of a scan. What is left goes to an
+//! [`Expansion`](super::expansion::Expansion), which takes five times as long.
 
 use super::DVec3;
 use super::number::{Ring, Vector};
 
-/// A line, and K times three points relative to where it starts. Along each axis lengths, and the direction, are multiples of a power of two of its own, which is in
-/// all volumes of three of them.
+/// A line, and K times three points relative to where it starts. Along each axis lengths, and the direction, are
+/// multiples of a power of two of its own, which is in all volumes of three of them.
 #[derive(Clone, Debug)]
 pub(crate) struct Integers<const K: usize> {
     pub direction: Vector<i64>,
     pub points: [[Vector<i64>; 3]; K],
-    /// The direction is also so many powers of two too large: where a volume of three points is divided by one of two and the direction, the quotient is too small by them.
+    /// The direction is also so many powers of two too large: where a volume of three points is divided by one of two
+    /// and the direction, the quotient is too small by them.
     pub exponent: i32,
 }
 
-/// Beside the bits of three factors: a sign, three for six products, and two for the sum of three such sums, or where two of the factors are edges, one bit longer each.
+/// Beside the bits of three factors: a sign, three for six products, and two for the sum of three such sums, or where
+/// two of the factors are edges, one bit longer each.
 const SPARE: u32 = 6;
 
 impl<const K: usize> Integers<K> {

@@ -53,7 +53,8 @@ pub fn rotation(axis: DVec3, degrees: f64) -> DQuat {
     DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos).normalize()
 }
 
-/// By what a map makes all lengths longer; none where it does not do so alike in all directions, by more than `tolerance` of the squares of lengths.
+/// By what a map makes all lengths longer; none where it does not do so alike in all directions, by more than
+/// `tolerance` of the squares of lengths.
 pub fn similarity(m: &DMat3, tolerance: f64) -> Option<f64> {
     let square = m.x_axis.length_squared();
     let is_alike = (m.transpose() * *m).abs_diff_eq(DMat3::from_diagonal(DVec3::splat(square)), square * tolerance);
@@ -74,12 +75,14 @@ pub fn is_invertible(transform: &DAffine3) -> bool {
     transform.is_finite() && transform.matrix3.determinant().is_normal() && transform.inverse().is_finite()
 }
 
-/// Whether things can be placed by a transform: it can be undone, and so can what it is as f32, which is what tracers place them by.
+/// Whether things can be placed by a transform: it can be undone, and so can what it is as f32, which is what tracers
+/// place them by.
 pub fn can_place(transform: &DAffine3) -> bool {
     is_invertible(transform) && is_invertible(&transform.as_affine3().as_daffine3())
 }
 
-/// Why nothing [can be placed](can_place) by a transform, and what would do: what follows the name of the thing in a message.
+/// Why nothing [can be placed](can_place) by a transform, and what would do: what follows the name of the thing in a
+/// message.
 pub fn placement_fault(transform: &DAffine3) -> Option<&'static str> {
     if !transform.as_affine3().is_finite() {
         return Some(
@@ -90,7 +93,8 @@ pub fn placement_fault(transform: &DAffine3) -> Option<&'static str> {
     is_singular.then_some("has a singular transform; give it a scale that is neither zero nor beyond what f32 holds")
 }
 
-/// The normal of a triangle, (b - a) x (c - a): not of unit length, and on the side from which a, b, c run counterclockwise.
+/// The normal of a triangle, (b - a) x (c - a): not of unit length, and on the side from which a, b, c run
+/// counterclockwise.
 #[inline(always)]
 pub fn triangle_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     (b - a).cross(c - a)
@@ -166,7 +170,8 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// How far it reaches along each row of a matrix, and against it: the largest scalar products of these with any of its points.
+    /// How far it reaches along each row of a matrix, and against it: the largest scalar products of these with any of
+    /// its points.
     #[inline(always)]
     pub fn extents(&self, rows: &DMat3) -> [DVec3; 2] {
         let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());

@@ -1,7 +1,8 @@
 //! An array that the program has filled, or that lies in a mapped file.
 //!
 //! Where it begins and ends is looked up once, when it is made, so that to index one costs what indexing a vector does.
-//! An enum that is matched at each access, the safe alternative, would put a branch into the innermost loop of every ray.
+//! An enum that is matched at each access, the safe alternative, would put a branch into the innermost loop of every
+//! ray.
 #![allow(unsafe_code)] // The slice is borrowed from its owner, which lies beside it.
 
 use std::fmt;
@@ -72,15 +73,16 @@ impl<T> Deref for Array<T> {
 
     #[inline(always)]
     fn deref(&self) -> &[T] {
-        // SAFETY: `first` and `len` are those of a slice of the owner: of a vector's values, whose place does not change
-        // while the vector is neither grown nor shrunk, which nothing here does; or of a mapping, which stays where it
-        // is until it is dropped, and of bytes that were found to be values of T. The owner lives as long as this
-        // borrow, and `make_mut` borrows it exclusively.
+        // SAFETY: `first` and `len` are those of a slice of the owner: of a vector's values, whose place does not
+        // change while the vector is neither grown nor shrunk, which nothing here does; or of a mapping, which stays
+        // where it is until it is dropped, and of bytes that were found to be values of T. The owner lives as long as
+        // this borrow, and `make_mut` borrows it exclusively.
         unsafe { std::slice::from_raw_parts(self.first, self.len) }
     }
 }
 
-// SAFETY: the pointer is to what the owner holds, and a vector, as a mapping, may go to another thread where its values may.
+// SAFETY: the pointer is to what the owner holds, and a vector, as a mapping, may go to another thread where its values
+// may.
 unsafe impl<T: Send + Sync> Send for Array<T> {}
 // SAFETY: through a shared array values are only read.
 unsafe impl<T: Send + Sync> Sync for Array<T> {}

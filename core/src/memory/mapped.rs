@@ -44,8 +44,8 @@ impl<'a> Mapped<'a> {
         // SAFETY: the mapping is private and read-only, and `Mmap` keeps it alive as long as the slice. That nobody
         // shortens or rewrites the file meanwhile is left to whoever runs the program, as with every program that maps
         // its input: shortening ends it with SIGBUS, and rewriting can give other numbers, which the loaders' checks
-        // (made on values they have copied out, or through bounds-checked indexing) keep from doing harm; a tree that is
-        // used where it lies is only indexed with bounds checked, too.
+        // (made on values they have copied out, or through bounds-checked indexing) keep from doing harm; a tree that
+        // is used where it lies is only indexed with bounds checked, too.
         let map = unsafe { Mmap::map(&file)? };
         Ok(Self { map: Some(map), on_bytes: None })
     }

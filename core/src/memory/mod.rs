@@ -1,9 +1,9 @@
 //! Memory that is large: arrays on huge pages, files mapped, and arrays that are either.
 //!
 //! An array of hundreds of megabytes on pages of 4 kB costs a fault for each page when it is first written, and misses
-//! of the translation buffer whenever it is read out of order. Measured on a virtual machine, first writing 360 MB takes
-//! 0.18 s on small pages and 0.04 s on huge ones. Linux gives huge pages on request (`madvise`), which is all that is
-//! unsafe in this file; elsewhere nothing is asked.
+//! of the translation buffer whenever it is read out of order. Measured on a virtual machine, first writing 360 MB
+//! takes 0.18 s on small pages and 0.04 s on huge ones. Linux gives huge pages on request (`madvise`), which is all
+//! that is unsafe in this file; elsewhere nothing is asked.
 #![allow(unsafe_code)] // One system call, which changes no byte.
 
 mod array;
@@ -18,8 +18,8 @@ pub use prefetch::prefetch;
 
 use bytemuck::Zeroable;
 
-/// Arrays below this many bytes have no huge page in them. Rays among 100,000 spheres, whose tree is of 5 MB, took 0.7 to 1.1 us in small pages, from one process to
-/// the next, and take 0.7 us in huge ones.
+/// Arrays below this many bytes have no huge page in them. Rays among 100,000 spheres, whose tree is of 5 MB, took 0.7
+/// to 1.1 us in small pages, from one process to the next, and take 0.7 us in huge ones.
 const LEAST: usize = 1 << 21;
 
 /// Bytes in a unit that suits them, for messages.

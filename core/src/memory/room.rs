@@ -40,7 +40,8 @@ pub(crate) const fn few<T>() -> usize {
     BYTES / size_of::<T>()
 }
 
-/// An array of which each chunk, given with how many values it makes, writes its own part; in order, on all threads, unless it is short.
+/// An array of which each chunk, given with how many values it makes, writes its own part; in order, on all threads,
+/// unless it is short.
 ///
 /// # Panics
 /// Where a chunk writes another number of values than it was given with.
@@ -65,8 +66,8 @@ pub(crate) fn fill<T: Send, C: Send>(chunks: Vec<(usize, C)>, write: impl Fn(C, 
     } else {
         jobs.into_par_iter().for_each(work)
     }
-    // SAFETY: the rooms are the first `len` slots of the capacity, each of which has been filled: the assertion above holds
-    // for all of them, or its panic has left this function.
+    // SAFETY: the rooms are the first `len` slots of the capacity, each of which has been filled: the assertion above
+    // holds for all of them, or its panic has left this function.
     unsafe { array.set_len(len) };
     array
 }

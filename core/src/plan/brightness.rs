@@ -6,10 +6,12 @@ use crate::math::{Aabb, DVec3, Vec3};
 use crate::scene::{Geometry, Light, Material, Scene, Texels};
 use crate::trace::World;
 
-/// No ray sees more than this, linear and in any channel; at least 1, and infinite where nothing is known, as beside a light that grows without bound.
+/// No ray sees more than this, linear and in any channel; at least 1, and infinite where nothing is known, as beside a
+/// light that grows without bound.
 ///
-/// What a ray sees is weighted along its way by what mirrors and glass leave of it. Glass has light denser within than outside, by the square of its index
-/// (`Way::scale`): a ray may weigh so much less within than what comes of it, which is counted here.
+/// What a ray sees is weighted along its way by what mirrors and glass leave of it. Glass has light denser within than
+/// outside, by the square of its index (`Way::scale`): a ray may weigh so much less within than what comes of it, which
+/// is counted here.
 pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
     // They take a look at every triangle, and only lamps ask for them.
     let bounds = LazyCell::new(|| world.bounds());
@@ -61,9 +63,10 @@ fn largest_tint(scene: &Scene) -> f32 {
     scene.geometries.iter().map(of_geometry).fold(1.0, f32::max)
 }
 
-/// What a material may look like where vertices' colours go up to `tint`, so that no part of what any place of it shows (matte, highlight, ambient) is brighter than
-/// in the brightest of these. Textures' colours go up to 1. Of one that follows from textures of other things, each part is a convex function of each of them, which
-/// is greatest at 0 or 1, and rises or falls with the components of a colour one by one.
+/// What a material may look like where vertices' colours go up to `tint`, so that no part of what any place of it shows
+/// (matte, highlight, ambient) is brighter than in the brightest of these. Textures' colours go up to 1. Of one that
+/// follows from textures of other things, each part is a convex function of each of them, which is greatest at 0 or 1,
+/// and rises or falls with the components of a colour one by one.
 fn looks(material: &Material, tint: f32) -> Vec<Material> {
     let Some(physical) = material.physical else {
         let [ambient, diffuse] = [material.ambient, material.diffuse].map(|color| color * tint);

@@ -64,15 +64,17 @@ struct Cost {
     building: u64,
 }
 
-/// Measured on terrains of 2 and 20 million triangles, scans and `architecture`; of bytes, what no mesh tried exceeds. The time to build includes
-/// the system's for handing out the memory, which is why compact trees are soon ready. The differences decide: of rays from the
-/// camera and to lights `FastCompact` pays below two thirds of one a triangle, `Fast` below nine, `High` above 310; of others below a twentieth, below two, above 31.
-/// `Compact` is for rays that would pay for `Default` where there is not the memory.
+/// Measured on terrains of 2 and 20 million triangles, scans and `architecture`; of bytes, what no mesh tried exceeds.
+/// The time to build includes the system's for handing out the memory, which is why compact trees are soon ready. The
+/// differences decide: of rays from the camera and to lights `FastCompact` pays below two thirds of one a triangle,
+/// `Fast` below nine, `High` above 310; of others below a twentieth, below two, above 31. `Compact` is for rays that
+/// would pay for `Default` where there is not the memory.
 const fn cost(preset: Preset) -> Cost {
     match preset {
         Preset::Fast => Cost { build: 105.0, ray: 95.0, sent_on: 340.0, tree: 66, building: 33 },
         Preset::Default => Cost { build: 290.0, ray: 75.0, sent_on: 250.0, tree: 58, building: 40 },
-        // Where triangles are long and thin a triangle takes 2000 and a ray that is sent on 200; elsewhere little is lost, and little won.
+        // Where triangles are long and thin a triangle takes 2000 and a ray that is sent on 200; elsewhere little is
+        // lost, and little won.
         Preset::High => Cost { build: 600.0, ray: 74.0, sent_on: 240.0, tree: 84, building: 84 },
         Preset::Compact => Cost { build: 210.0, ray: 115.0, sent_on: 650.0, tree: 16, building: 40 },
         Preset::FastCompact => Cost { build: 75.0, ray: 140.0, sent_on: 900.0, tree: 18, building: 20 },
@@ -181,7 +183,8 @@ mod tests {
     #[test]
     fn rays_pay_for_triangles() {
         use Preset::{Default, Fast, FastCompact, High};
-        // The limits follow from the costs: (105 - 75) / (140 - 95), (290 - 105) / (95 - 75) and (600 - 290) / (75 - 74).
+        // The limits follow from the costs: (105 - 75) / (140 - 95), (290 - 105) / (95 - 75) and (600 - 290) / (75 -
+        // 74).
         let of_camera =
             [(0.0, FastCompact), (0.6, FastCompact), (0.7, Fast), (9.0, Fast), (9.5, Default), (309.0, Default)];
         for (rays, expected) in of_camera.into_iter().chain([(311.0, High), (10_000.0, High)]) {

@@ -1,4 +1,5 @@
-//! What is in a scene, counted once: all that a plan follows from, but for what must be looked for in textures and triangles.
+//! What is in a scene, counted once: all that a plan follows from, but for what must be looked for in textures and
+//! triangles.
 
 use std::collections::BTreeMap;
 

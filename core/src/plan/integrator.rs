@@ -1,7 +1,7 @@
 //! Which integrator renders a scene: the cheapest that shows everything in it.
 //!
-//! Indirect light is in every scene that is not black, so it is no reason to trace paths: light that comes from nothing but surfaces
-//! that glow is, for without paths the picture would be dark.
+//! Indirect light is in every scene that is not black, so it is no reason to trace paths: light that comes from nothing
+//! but surfaces that glow is, for without paths the picture would be dark.
 
 use crate::scene::Integrator;
 

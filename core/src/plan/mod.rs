@@ -10,10 +10,10 @@
 //! | `build` | how well the tree is worth building |
 //! | `text`, `report` | the plan in words, and as a document |
 //!
-//! [`Plan::new`] takes the census and switches off what no pixel can show: shadow rays where no light casts
-//! any, texture coordinates where no texture is used, shading normals where no mesh in view of a light has them, the
-//! ambient term, lights that are black or out of reach. What the plan decides the renderer reads there, and never decides again; of the scene it takes
-//! materials, textures and the lights that are left.
+//! [`Plan::new`] takes the census and switches off what no pixel can show: shadow rays where no light casts any,
+//! texture coordinates where no texture is used, shading normals where no mesh in view of a light has them, the ambient
+//! term, lights that are black or out of reach. What the plan decides the renderer reads there, and never decides
+//! again; of the scene it takes materials, textures and the lights that are left.
 
 mod brightness;
 mod build;
@@ -64,8 +64,9 @@ pub const DEFAULT_DEPTH: u32 = 5;
 /// How often paths are scattered at most where nobody says; nearly all end earlier, by chance.
 pub const DEFAULT_PATH_DEPTH: u32 = 64;
 
-/// A share of the picture, in each channel, that is not worth the mirrored and refracted rays to what is white and less which would add it: below half the smallest
-/// step of 8 bits, which in sRGB is 1 / 255 / 12.92. Where something may be brighter, the share is as much smaller ([`Census::brightest`]).
+/// A share of the picture, in each channel, that is not worth the mirrored and refracted rays to what is white and less
+/// which would add it: below half the smallest step of 8 bits, which in sRGB is 1 / 255 / 12.92. Where something may be
+/// brighter, the share is as much smaller ([`Census::brightest`]).
 pub const FAINT: f32 = 1e-4;
 
 /// What is wanted of a render. What is none is chosen.
@@ -98,11 +99,13 @@ pub struct Plan {
     pub integrator: Integrator,
     /// Why that far, in words.
     pub why: &'static str,
-    /// Whether something glows that lights nothing else: only paths find that light, and nobody has said how far light is to be followed.
+    /// Whether something glows that lights nothing else: only paths find that light, and nobody has said how far light
+    /// is to be followed.
     pub idle_emitters: bool,
     /// How often rays may be sent on; 0 where nothing does.
     pub depth: u32,
-    /// Mirrored and refracted rays are not followed whose shares come to no more than this for a sample, all together: [`FAINT`] by what is brightest, or 0.
+    /// Mirrored and refracted rays are not followed whose shares come to no more than this for a sample, all together:
+    /// [`FAINT`] by what is brightest, or 0.
     pub faint: f32,
     /// Whether textures bend normals.
     pub normal_maps: bool,
@@ -300,7 +303,8 @@ impl PlanInputs<'_> {
         }
     }
 
-    /// What is interpolated where a ray hits, and whether normals are mapped. `is_shaded`: whether light is asked for there, or rays go on.
+    /// What is interpolated where a ray hits, and whether normals are mapped. `is_shaded`: whether light is asked for
+    /// there, or rays go on.
     fn attributes(&self, is_shaded: bool, ambient: bool) -> (Attributes, bool) {
         let Census { materials, meshes, .. } = self.census;
         let all = self.options.complete.has(Reduction::Surfaces);

@@ -1,7 +1,9 @@
-//! Whether a light can reach anything: by its range, its cone and the side it shines to, against the box around the scene.
+//! Whether a light can reach anything: by its range, its cone and the side it shines to, against the box around the
+//! scene.
 //!
-//! What is refused here gives exactly nothing at every point of the box, so that no picture of recursive ray tracing changes; path tracing
-//! chooses among fewer lights, and is less noisy. Whether something stands in between is not asked: that is what rays are for.
+//! What is refused here gives exactly nothing at every point of the box, so that no picture of recursive ray tracing
+//! changes; path tracing chooses among fewer lights, and is less noisy. Whether something stands in between is not
+//! asked: that is what rays are for.
 
 use crate::math::{DAabb, DVec3};
 use crate::scene::{AreaShape, Light};

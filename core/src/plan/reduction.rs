@@ -1,7 +1,8 @@
 //! What a plan leaves out of the complete model, each of which can be put back.
 //!
-//! A picture must not depend on what was left out: `--plan full` renders the complete model, and tests hold both against each other, to
-//! the bit. Leaving out without a way back would be simpler, and every reduction would have to be believed.
+//! A picture must not depend on what was left out: `--plan full` renders the complete model, and tests hold both
+//! against each other, to the bit. Leaving out without a way back would be simpler, and every reduction would have to
+//! be believed.
 
 /// Something that a plan leaves out where a scene does not need it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,7 +1,7 @@
 //! How many rays a render will trace, before any is: what a tree is worth depends on it.
 //!
-//! It is a guess from counts: every ray is taken to hit, and materials to be seen as often as they have primitives. Tracing a small
-//! picture first would tell better, and needs the tree whose quality is to be chosen.
+//! It is a guess from counts: every ray is taken to hit, and materials to be seen as often as they have primitives.
+//! Tracing a small picture first would tell better, and needs the tree whose quality is to be chosen.
 
 use serde::Serialize;
 

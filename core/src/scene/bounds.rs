@@ -1,7 +1,7 @@
 //! The bounds of a scene: exact for meshes, however often they are placed, at the cost of a few of the placements.
 //!
-//! Most of what is placed lies within the bounds of the rest, and says so by its box alone; of a mesh that sticks out, so do most
-//! pieces of it.
+//! Most of what is placed lies within the bounds of the rest, and says so by its box alone; of a mesh that sticks out,
+//! so do most pieces of it.
 
 use rayon::prelude::*;
 
@@ -15,7 +15,8 @@ const PIECE: usize = 256;
 const TASK: usize = 64;
 
 impl Scene {
-    /// Bounds of everything that has bounds, in scene coordinates, at all times: of all shapes but planes, and of what [`Mesh::bounds`] counts.
+    /// Bounds of everything that has bounds, in scene coordinates, at all times: of all shapes but planes, and of what
+    /// [`Mesh::bounds`] counts.
     ///
     /// # Panics
     /// For an instance of a group that there is not.

@@ -70,9 +70,9 @@ pub struct ThinLens {
     pub blades: u32,
 }
 
-/// The distortion of Brown (1966, *Decentering distortion of lenses*) and Conrady (1919), in OpenCV's order and sense: a
-/// point that would be seen at (x, y) at distance 1, x to the right and y down, is seen at x (1 + k1 r^2 + k2 r^4 + k3 r^6) +
-/// 2 p1 x y + p2 (r^2 + 2 x^2), y (1 + ...) + p1 (r^2 + 2 y^2) + 2 p2 x y.
+/// The distortion of Brown (1966, *Decentering distortion of lenses*) and Conrady (1919), in OpenCV's order and sense:
+/// a point that would be seen at (x, y) at distance 1, x to the right and y down, is seen at x (1 + k1 r^2 + k2 r^4 +
+/// k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y (1 + ...) + p1 (r^2 + 2 y^2) + 2 p2 x y.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
     /// Radial, second power.
@@ -132,9 +132,10 @@ impl Camera {
     /// The largest [`shift`](Self::shift) that a picture is made with.
     pub const MAX_SHIFT: f64 = 1000.0;
 
-    /// A camera at `eye` that looks at `target`, with a vertical angle of view of `fov` radians, between 0 and pi. Where `up` is along the view, up in the
-    /// picture is what it becomes for a camera that is tilted until it looks up or down: -z for one that looks along -z
-    /// and is tilted down. None where `eye` and `target` coincide, where `up` is zero, and where these are not finite; the angle is looked at by who renders.
+    /// A camera at `eye` that looks at `target`, with a vertical angle of view of `fov` radians, between 0 and pi.
+    /// Where `up` is along the view, up in the picture is what it becomes for a camera that is tilted until it looks up
+    /// or down: -z for one that looks along -z and is tilted down. None where `eye` and `target` coincide, where `up`
+    /// is zero, and where these are not finite; the angle is looked at by who renders.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov: f64) -> Option<Self> {
         let back = (eye - target).try_normalize()?;
         let up = up.try_normalize()?;
@@ -174,10 +175,12 @@ impl Camera {
         }
     }
 
-    /// A view of the whole of `bounds`, from the front, a little from the right and above; of something about a point, where there is no more to see.
+    /// A view of the whole of `bounds`, from the front, a little from the right and above; of something about a point,
+    /// where there is no more to see.
     ///
     /// # Panics
-    /// For bounds that reach beyond 1e150, and an aspect that is not between 1e-100 and 1e100: lengths and angles are then not finite, or 0.
+    /// For bounds that reach beyond 1e150, and an aspect that is not between 1e-100 and 1e100: lengths and angles are
+    /// then not finite, or 0.
     pub fn framing(bounds: &DAabb, aspect: f64) -> Self {
         let fov = DEFAULT_FOV.to_radians();
         let half = (fov / 2.0).min(libm::atan(libm::tan(fov / 2.0) * aspect));

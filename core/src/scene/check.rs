@@ -13,9 +13,10 @@ use crate::error::{Error, Result};
 use crate::math::{DVec3, MAX_COORDINATE, Vec3};
 
 impl Scene {
-    /// Whether all indices are in range, attributes match, and materials, shapes, placements and lights can be. What `io::load` gives
-    /// has been checked; what is made by hand should be, for the tracers rely on it. Corners of triangles may be NaN or infinite: those are never hit. Whether a
-    /// placement can be undone is for [`World::new`](crate::World::new) to say.
+    /// Whether all indices are in range, attributes match, and materials, shapes, placements and lights can be. What
+    /// `io::load` gives has been checked; what is made by hand should be, for the tracers rely on it. Corners of
+    /// triangles may be NaN or infinite: those are never hit. Whether a placement can be undone is for
+    /// [`World::new`](crate::World::new) to say.
     ///
     /// # Errors
     /// [`Error::Scene`] with the first thing that is wrong.

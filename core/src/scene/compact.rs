@@ -12,9 +12,9 @@ use crate::math::{Vec3, is_traceable};
 const TASK: usize = 1 << 14;
 
 impl Mesh {
-    /// Leaves out the vertices that no triangle names, if the outermost are among them: a stray one far away would frame the scene for the camera, and leave f32
-    /// little of what is seen. Of a triangle that no ray can hit, since a corner is NaN, infinite or too far away, that corner alone is kept, three times. How many
-    /// of these there are.
+    /// Leaves out the vertices that no triangle names, if the outermost are among them: a stray one far away would
+    /// frame the scene for the camera, and leave f32 little of what is seen. Of a triangle that no ray can hit, since a
+    /// corner is NaN, infinite or too far away, that corner alone is kept, three times. How many of these there are.
     ///
     /// # Panics
     /// For a triangle that names a vertex that there is not.
@@ -41,8 +41,8 @@ impl Mesh {
     }
 }
 
-/// Whether, of those that are farthest along each axis, one each way is a triangle's corner. Most often all vertices are: to look for six of them among the
-/// corners takes a tenth of the time that it takes to mark all.
+/// Whether, of those that are farthest along each axis, one each way is a triangle's corner. Most often all vertices
+/// are: to look for six of them among the corners takes a tenth of the time that it takes to mark all.
 fn outermost_are_used(positions: &[Vec3], corners: &[u32]) -> bool {
     // Six times an index: of the least coordinates, and of the largest.
     let farther = |a: [u32; 6], b: [u32; 6]| -> [u32; 6] {
@@ -65,8 +65,8 @@ fn outermost_are_used(positions: &[Vec3], corners: &[u32]) -> bool {
     seen.reduce(|| [false; 6], either) == [true; 6]
 }
 
-/// The vertices that are used, in rising order, and makes the corners indices into those; none, and leaves the corners as
-/// they are, where all `count` vertices are used.
+/// The vertices that are used, in rising order, and makes the corners indices into those; none, and leaves the corners
+/// as they are, where all `count` vertices are used.
 pub fn compact(corners: &mut [u32], count: usize) -> Option<Vec<u32>> {
     // A flag for each vertex costs no more than the corners do where there are no more vertices than corners; where
     // there are, a small part of a shared list is used, and is sorted.

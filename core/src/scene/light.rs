@@ -73,8 +73,8 @@ pub enum Light {
         /// Half-angle from which there is none, radians; above `inner_angle`.
         outer_angle: f32,
     },
-    /// From a surface, each point of which shines alike to all sides it faces: shadows are soft. It cannot be seen itself;
-    /// a shape of a material with emission in its place can, and is not in its way.
+    /// From a surface, each point of which shines alike to all sides it faces: shadows are soft. It cannot be seen
+    /// itself; a shape of a material with emission in its place can, and is not in its way.
     Area {
         /// Where.
         shape: AreaShape,

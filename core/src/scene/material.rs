@@ -96,7 +96,8 @@ pub struct Material {
     pub diffuse_texture: Option<u32>,
     /// Multiplies `emission`; index into [`Scene::textures`](crate::Scene::textures).
     pub emission_texture: Option<u32>,
-    /// Bends the shading normal; index into [`Scene::textures`](crate::Scene::textures), whose colours are numbers then.
+    /// Bends the shading normal; index into [`Scene::textures`](crate::Scene::textures), whose colours are numbers
+    /// then.
     pub normal_texture: Option<u32>,
     /// Multiplies how far it is bent.
     pub normal_scale: f32,
@@ -106,8 +107,8 @@ pub struct Material {
     pub opacity: f32,
     /// Which highlight.
     pub model: Specular,
-    /// What the colours and the highlight follow from where textures vary more than the diffuse colour; those above are then
-    /// of its average.
+    /// What the colours and the highlight follow from where textures vary more than the diffuse colour; those above are
+    /// then of its average.
     pub physical: Option<Physical>,
 }
 
@@ -179,13 +180,14 @@ impl Material {
         !self.unlit && (self.diffuse != Vec3::ZERO || self.specular != Vec3::ZERO)
     }
 
-    /// The exponent of the highlight, but no more than 10^10: such a highlight is narrower than rays of any picture are apart, and sharper ones f64 cannot tell.
+    /// The exponent of the highlight, but no more than 10^10: such a highlight is narrower than rays of any picture are
+    /// apart, and sharper ones f64 cannot tell.
     pub(crate) fn exponent(&self) -> f32 {
         self.shininess.min(1e10)
     }
 
-    /// What an energy-conserving highlight is scaled by: pi times the factor of its f, so that met head-on it sends on just `specular`. None for the classic one, which has
-    /// no such factor.
+    /// What an energy-conserving highlight is scaled by: pi times the factor of its f, so that met head-on it sends on
+    /// just `specular`. None for the classic one, which has no such factor.
     pub(crate) fn highlight_scale(&self) -> Option<f32> {
         let n = self.exponent();
         self.energy_conserving.then(|| match self.model {

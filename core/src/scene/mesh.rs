@@ -39,8 +39,8 @@ impl Mesh {
         Self { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Self::default() }
     }
 
-    /// Stores f64 positions as f32 offsets from an origin in the middle of those that triangles name which rays can hit, where these are far from zero; in
-    /// the middle of all of them where the mesh has no triangles yet.
+    /// Stores f64 positions as f32 offsets from an origin in the middle of those that triangles name which rays can
+    /// hit, where these are far from zero; in the middle of all of them where the mesh has no triangles yet.
     pub fn set_positions(&mut self, positions: &[DVec3]) {
         let bounds = if self.triangles.is_empty() {
             bounds_of(positions, |p| Some(*p))
@@ -58,7 +58,8 @@ impl Mesh {
         self.origin + offset.as_dvec3()
     }
 
-    /// The bounds of the traceable vertices under `transform`, those that no triangle names among them: reading a file leaves these out.
+    /// The bounds of the traceable vertices under `transform`, those that no triangle names among them: reading a file
+    /// leaves these out.
     pub fn bounds(&self, transform: &DAffine3) -> DAabb {
         let place = |p: Vec3| transform.transform_point3(self.point(p));
         let tasks = self.positions.par_chunks(TASK);
@@ -81,8 +82,9 @@ impl Mesh {
         DAabb::EMPTY.include(place(bounds.min)).include(place(bounds.max))
     }
 
-    /// A copy in the coordinates that `transform` leads to. It need not be invertible: what it presses flat is flat, and a normal along which it
-    /// presses is zero, which shades as flat. Where it mirrors, corners go round the other way, so that fronts stay fronts.
+    /// A copy in the coordinates that `transform` leads to. It need not be invertible: what it presses flat is flat,
+    /// and a normal along which it presses is zero, which shades as flat. Where it mirrors, corners go round the other
+    /// way, so that fronts stay fronts.
     pub fn placed(&self, transform: &DAffine3) -> Self {
         let positions: Vec<DVec3> =
             self.positions.par_iter().map(|&offset| transform.transform_point3(self.point(offset))).collect();
@@ -132,8 +134,9 @@ impl Mesh {
     }
 
     /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
-    /// the angle at the corner (Thürmer and Wüthrich 1998, *Computing vertex normals from polygonal facets*).
-    /// Vertices that no triangle with an area uses get the zero vector, which shades as flat. A triangle that no ray can hit has none.
+    /// the angle at the corner (Thürmer and Wüthrich 1998, *Computing vertex normals from polygonal facets*). Vertices
+    /// that no triangle with an area uses get the zero vector, which shades as flat. A triangle that no ray can hit has
+    /// none.
     ///
     /// # Panics
     /// For a triangle that names a vertex that there is not.

@@ -73,7 +73,8 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// What fills the space between things.
     pub fog: Option<Fog>,
-    /// What a ray that hits nothing sees, linear RGB; before an environment, camera rays alone; none where the picture is to be transparent.
+    /// What a ray that hits nothing sees, linear RGB; before an environment, camera rays alone; none where the picture
+    /// is to be transparent.
     pub background: Option<Vec3>,
     /// What the file wants of a render.
     pub request: Request,
@@ -170,8 +171,8 @@ impl Scene {
             .sum()
     }
 
-    /// Moves the whole scene: instances, lights and cameras. Scales lengths, not intensities. The environment stays as it is: up in its picture is up, +y, whatever
-    /// was up in the file.
+    /// Moves the whole scene: instances, lights and cameras. Scales lengths, not intensities. The environment stays as
+    /// it is: up in its picture is up, +y, whatever was up in the file.
     pub fn transform(&mut self, transform: &DAffine3) {
         for instance in &mut self.instances {
             instance.transform = *transform * instance.transform;

@@ -4,25 +4,29 @@
 //!
 //! - Kd = lerp(b, b / 2, m). A real metal has no diffuse part; but what it mirrors are its surroundings, and here there
 //!   are none: it would be black but for its highlights. The diffuse half stands for even surroundings.
-//! - F = lerp(p, b / 2, m) is left for the highlight, so that no more light is sent out than arrives. Plastic's p is 0.04, or with the
-//!   index n of `KHR_materials_ior` ((n - 1) / (n + 1))^2, times factor and colour of `KHR_materials_specular`, at most 1.
+//! - F = lerp(p, b / 2, m) is left for the highlight, so that no more light is sent out than arrives. Plastic's p is
+//!   0.04, or with the index n of `KHR_materials_ior` ((n - 1) / (n + 1))^2, times factor and colour of
+//!   `KHR_materials_specular`, at most 1.
 //! - The exponent n = 2 / alpha^2 - 2 with alpha = r^2 gives the highlight of Blinn-Phong the width of the microfacets'
 //!   (Walter et al. 2007, *Microfacet models for refraction through rough surfaces*).
-//! - Ks = F min(1, (n + 2) / 8): (n + 2) / 8 keeps the energy of a highlight while it widens (Akenine-Moller et al. 2018,
-//!   *Real-Time Rendering*, section 9.8). With F alone, a rough metal (n = 0) is white all over. Sharp highlights stop at
-//!   F, as Phong's do; their true peak is hundreds of times brighter than the light's own colour.
+//! - Ks = F min(1, (n + 2) / 8): (n + 2) / 8 keeps the energy of a highlight while it widens (Akenine-Moller et al.
+//!   2018, *Real-Time Rendering*, section 9.8). With F alone, a rough metal (n = 0) is white all over. Sharp highlights
+//!   stop at F, as Phong's do; their true peak is hundreds of times brighter than the light's own colour.
 //!
 //! With the share t of `KHR_materials_transmission` (of what is not metal):
 //!
-//! - (1 - t) Kd stays diffuse, t b goes through, the exact share of Fresnel's equations is mirrored, times factor and colour of
-//!   `KHR_materials_specular`. With a thickness in `KHR_materials_volume` light is refracted, without it goes straight through.
+//! - (1 - t) Kd stays diffuse, t b goes through, the exact share of Fresnel's equations is mirrored, times factor and
+//!   colour of `KHR_materials_specular`. With a thickness in `KHR_materials_volume` light is refracted, without it goes
+//!   straight through.
 //! - Rough glass spreads both by the exponent n / 4: mirroring doubles the angle by which a normal is off.
 //!
-//! Of specular-glossiness (`KHR_materials_pbrSpecularGlossiness`) with diffuse colour d, specular f and glossiness g, r = 1 - g, and what f has
-//! beyond plastic's 0.04 is metal: Kd = d (1 - max f) + max(f - 0.04, 0) / 2, and F is f without that half.
+//! Of specular-glossiness (`KHR_materials_pbrSpecularGlossiness`) with diffuse colour d, specular f and glossiness g,
+//! r = 1 - g, and what f has beyond plastic's 0.04 is metal: Kd = d (1 - max f) + max(f - 0.04, 0) / 2, and F is f
+//! without that half.
 //!
-//! Textures of these quantities are looked up at each hit, by materials that have some. Those that have none pay nothing: what is here is
-//! computed once, when they are loaded. Microfacets themselves, the alternative, wait for a lobe of their own.
+//! Textures of these quantities are looked up at each hit, by materials that have some. Those that have none pay
+//! nothing: what is here is computed once, when they are loaded. Microfacets themselves, the alternative, wait for a
+//! lobe of their own.
 
 use super::Material;
 use crate::math::Vec3;
@@ -207,7 +211,8 @@ impl MetallicRoughness {
             ior: self.ior.filter(|n| *n > 0.0).unwrap_or(Material::default().ior),
             ..shiny(diffuse, mirrored, roughness)
         };
-        // Of what lets light through anywhere all is glass, also where its texture is black: it mirrors what it does not let in.
+        // Of what lets light through anywhere all is glass, also where its texture is black: it mirrors what it does
+        // not let in.
         if self.transmission == 0.0 {
             return plain;
         }

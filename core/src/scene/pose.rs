@@ -1,8 +1,8 @@
 //! Where a camera stands, and how it goes from one place to another.
 //!
-//! The eye runs along a straight line, as every point of what moves does; the camera turns about one axis, evenly, so that its picture never shrinks or
-//! shears on the way. Interpolating the entries of its matrix, as is done with instances, would do both. All of it is
-//! f64, for a camera may be far from zero.
+//! The eye runs along a straight line, as every point of what moves does; the camera turns about one axis, evenly, so
+//! that its picture never shrinks or shears on the way. Interpolating the entries of its matrix, as is done with
+//! instances, would do both. All of it is f64, for a camera may be far from zero.
 
 use crate::math::{DAffine3, DMat3, DQuat, DVec3};
 

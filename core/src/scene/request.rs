@@ -7,7 +7,8 @@ use crate::image::{Curve, Response};
 pub const MAX_SIDE: u32 = 65_536;
 /// Most samples a pixel that can be asked for.
 pub const MAX_SPP: u32 = 65_536;
-/// How often a ray may be sent on at most. Rays that were sent on together are followed by a call of their own, so that the stack has to have room for as many.
+/// How often a ray may be sent on at most. Rays that were sent on together are followed by a call of their own, so that
+/// the stack has to have room for as many.
 pub const MAX_DEPTH: u32 = 1000;
 
 /// How far light is followed.
@@ -56,7 +57,8 @@ pub struct Request {
     pub max_depth: Option<u32>,
     /// Name of the picture's file, as it stands in the scene file.
     pub output: Option<String>,
-    /// Stops that pictures of codes are exposed by; see [`Response`](crate::image::Response), as for the two that follow.
+    /// Stops that pictures of codes are exposed by; see [`Response`](crate::image::Response), as for the two that
+    /// follow.
     pub exposure: Option<f32>,
     /// Kelvin of the light that becomes white.
     pub white_balance: Option<f32>,

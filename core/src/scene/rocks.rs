@@ -15,8 +15,8 @@ const SPACING: f64 = 2.2;
 /// A scene of `n` placements of one rock of 8,192 triangles, metres, +y up, each of which touches y = 0 from above.
 ///
 /// They stand on a spiral whose turn from rock to rock is the golden angle, so that any number of them fills a disc
-/// evenly (Vogel 1979, *A better way to construct the sunflower head*). Attitude and the scale of each axis, 0.6 to 1.4, follow
-/// from multiples of irrational numbers: spread as evenly, and the same everywhere.
+/// evenly (Vogel 1979, *A better way to construct the sunflower head*). Attitude and the scale of each axis, 0.6 to
+/// 1.4, follow from multiples of irrational numbers: spread as evenly, and the same everywhere.
 pub fn rocks(n: u32) -> Scene {
     let rock = rock();
     let instances = (0..n).map(|i| Instance {

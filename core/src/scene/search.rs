@@ -51,8 +51,8 @@ impl Accel {
     }
 }
 
-/// How many cells a grid has. Halved along all axes as often as it takes to have no more than [`Resolution::MAX_CELLS`], and than
-/// a billion references to items.
+/// How many cells a grid has. Halved along all axes as often as it takes to have no more than
+/// [`Resolution::MAX_CELLS`], and than a billion references to items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resolution {
     /// So many along the longest side; cubes.

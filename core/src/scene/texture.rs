@@ -26,8 +26,9 @@ pub enum Filter {
     Linear,
 }
 
-/// What a picture shows, row by row, the first at the top: sRGB-encoded colour, or numbers, and linear alpha; in as many bits as its file has.
-/// Shared by textures that show the same picture in other places. All in 16 bits would be one way through the code, and twice the memory for most.
+/// What a picture shows, row by row, the first at the top: sRGB-encoded colour, or numbers, and linear alpha; in as
+/// many bits as its file has. Shared by textures that show the same picture in other places. All in 16 bits would be
+/// one way through the code, and twice the memory for most.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Pixels {
     /// Channels of 8 bits.

@@ -6,7 +6,8 @@ use super::{SurfacePoint, texture};
 use crate::math::{Vec3, Vec4};
 use crate::scene::{Material, Texels, Texture};
 
-/// The material at `point`: itself, but where vertices have colours, and for those whose [`Material::physical`] textures multiply there.
+/// The material at `point`: itself, but where vertices have colours, and for those whose [`Material::physical`]
+/// textures multiply there.
 pub fn at<'a>(material: &'a Material, point: &SurfacePoint, textures: &[Texture]) -> Cow<'a, Material> {
     let tint = point.color.truncate();
     let Some(physical) = &material.physical else {

@@ -1,5 +1,6 @@
-//! Points of a light's surface, chosen evenly: by the cone they fill for spheres (Shirley, Wang, Zimmerman 1996, *Monte Carlo techniques
-//! for direct lighting calculations*), by the solid angle they fill for rectangles and disks that are near, by area for other flat ones.
+//! Points of a light's surface, chosen evenly: by the cone they fill for spheres (Shirley, Wang, Zimmerman 1996, *Monte
+//! Carlo techniques for direct lighting calculations*), by the solid angle they fill for rectangles and disks that are
+//! near, by area for other flat ones.
 
 use super::ellipse::SphericalEllipse;
 use super::light::LightSample;
@@ -10,7 +11,8 @@ use crate::scene::AreaShape;
 /// Chained f32 roundings in the test of a ray against what stands in a light's place; generous.
 const ROUNDINGS: u32 = 32;
 
-/// Where a light is met at less than this, what stands in its place is taken to be in the way rather than that what stands before it is not.
+/// Where a light is met at less than this, what stands in its place is taken to be in the way rather than that what
+/// stands before it is not.
 const MIN_COSINE: f64 = 1e-3;
 
 /// What arrives at `point` from the part of the light that `xi`, a point of the unit square, chooses, as if all of it
@@ -47,7 +49,8 @@ fn near(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<Spherical
     if is_rectangle { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
 }
 
-/// From the light at `offset` from the point, in whose direction as many are chosen, per steradian; `across` is a vector across it.
+/// From the light at `offset` from the point, in whose direction as many are chosen, per steradian; `across` is a
+/// vector across it.
 fn towards(point: DVec3, offset: DVec3, pdf: f64, radiance: Vec3, across: DVec3) -> LightSample {
     let to_light = offset.normalize();
     let cosine = to_light.dot(across.normalize_or_zero());
@@ -56,8 +59,8 @@ fn towards(point: DVec3, offset: DVec3, pdf: f64, radiance: Vec3, across: DVec3)
     LightSample { to_light, color, end, pdf: Some(pdf) }
 }
 
-/// From a point on a flat light of the given area (a vector across it): E = L cos A / d^2, of which a white matte surface
-/// sends on 1 / pi.
+/// From a point on a flat light of the given area (a vector across it): E = L cos A / d^2, of which a white matte
+/// surface sends on 1 / pi.
 fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<LightSample> {
     let offset = at - point;
     let squared = offset.length_squared();
@@ -97,7 +100,8 @@ fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -
     Some(LightSample { to_light, color, end, pdf })
 }
 
-/// The cone that a sphere fills, as 1 - cos of its half angle, without the difference; of all directions for a point inside.
+/// The cone that a sphere fills, as 1 - cos of its half angle, without the difference; of all directions for a point
+/// inside.
 fn opening(distance: f64, radius: f64, side: Side) -> f64 {
     let sine = (radius / distance).min(1.0);
     if side == Side::Outside { sine * sine / (1.0 + (1.0 - sine * sine).sqrt()) } else { 2.0 }
@@ -108,7 +112,8 @@ fn opening(distance: f64, radius: f64, side: Side) -> f64 {
 enum Side {
     /// It sees a cone full of it.
     Outside,
-    /// It sees it in one half of all directions, and nothing of it in the other: what has its place is convex and does not light itself.
+    /// It sees it in one half of all directions, and nothing of it in the other: what has its place is convex and does
+    /// not light itself.
     On,
     /// It sees it wherever it looks.
     Inside,
@@ -117,7 +122,8 @@ enum Side {
 impl Side {
     /// Of a point so far from the centre.
     fn of(distance: f64, centre: DVec3, radius: f64) -> Self {
-        // By what f32 rounds of the centre, along all axes, and of the radius of what stands in its place; not by more, for what stands beside it is not on it.
+        // By what f32 rounds of the centre, along all axes, and of the radius of what stands in its place; not by more,
+        // for what stands beside it is not on it.
         let slack = f64::from(UNIT_ROUNDOFF) * (2.0 * centre.abs().max_element() + 16.0 * radius);
         let above = distance - radius;
         if above.abs() <= slack.min(radius / 16.0) {
@@ -130,8 +136,8 @@ impl Side {
     }
 }
 
-/// How densely [`sample`] chooses the direction from `point` to `at`, a point of the light, per steradian; none where the
-/// light turns its back.
+/// How densely [`sample`] chooses the direction from `point` to `at`, a point of the light, per steradian; none where
+/// the light turns its back.
 pub(super) fn pdf(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64> {
     let area = match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
@@ -156,8 +162,8 @@ pub(super) fn pdf(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64> {
     (facing > 0.0).then(|| offset.length_squared() / facing)
 }
 
-/// A point before `at` on the way from `point`, by what f32 may move the surface there, across it: what stands in the light's place must
-/// not be in its way. `cosine` is of the way to the surface's normal.
+/// A point before `at` on the way from `point`, by what f32 may move the surface there, across it: what stands in the
+/// light's place must not be in its way. `cosine` is of the way to the surface's normal.
 pub(super) fn short_of(at: DVec3, to_light: DVec3, point: DVec3, cosine: f64) -> DVec3 {
     let slack = f64::from(gamma(ROUNDINGS)) * (at.abs().max_element() + (at - point).length());
     let along = slack / cosine.abs().max(MIN_COSINE);
@@ -237,7 +243,8 @@ mod tests {
         }
     }
 
-    /// A light a thousand times as large as it is away fills the half of all directions: 256 tell so. By area, few points of it would be near.
+    /// A light a thousand times as large as it is away fills the half of all directions: 256 tell so. By area, few
+    /// points of it would be near.
     #[test]
     fn few_directions_suffice_where_a_light_is_near() {
         let (centre, wide) = (DVec3::new(150.0, 3.0, -200.0), 3000.0);
@@ -272,7 +279,8 @@ mod tests {
         }
     }
 
-    /// What stands close beside a ball far from zero sees the cone that it fills: (r / d)^2 under it, to where its shadow rays would end behind it.
+    /// What stands close beside a ball far from zero sees the cone that it fills: (r / d)^2 under it, to where its
+    /// shadow rays would end behind it.
     #[test]
     fn what_is_beside_a_ball_is_not_on_it() {
         let (centre, radius) = (DVec3::new(1000.0, 0.1, 1000.0), 0.1);

@@ -1,8 +1,8 @@
 //! Which glowing surface stands in the place of a light.
 //!
-//! Lights with a surface cannot be seen, so scenes put a shape that glows where they are. Every corner of it then lies on the light's
-//! surface, and the middles of its triangles close to it, which no other surface does by chance. To have the file say
-//! so would leave out all files that cannot.
+//! Lights with a surface cannot be seen, so scenes put a shape that glows where they are. Every corner of it then lies
+//! on the light's surface, and the middles of its triangles close to it, which no other surface does by chance. To have
+//! the file say so would leave out all files that cannot.
 
 use crate::math::DVec3;
 use crate::scene::{AreaShape, Light};

@@ -1,6 +1,6 @@
-//! A disk as a point sees it: a spherical ellipse, whose directions are chosen nearly evenly by the solid angle that it fills. Seen along the
-//! axis of the cone through it, it is an ellipse (Guillén, Ureña, King, Fajardo, Georgiev, López-Moreno, Jarabo 2017, *Area-preserving
-//! parameterizations for spherical ellipses*).
+//! A disk as a point sees it: a spherical ellipse, whose directions are chosen nearly evenly by the solid angle that it
+//! fills. Seen along the axis of the cone through it, it is an ellipse (Guillén, Ureña, King, Fajardo, Georgiev,
+//! López-Moreno, Jarabo 2017, *Area-preserving parameterizations for spherical ellipses*).
 
 use std::f64::consts::TAU;
 
@@ -19,8 +19,8 @@ pub(super) struct SphericalEllipse {
 }
 
 impl SphericalEllipse {
-    /// What `point` sees of the disk. None where it turns its back, for a point in its plane, and where it is far away for its size: there
-    /// an even choice by area is nearly one by solid angle.
+    /// What `point` sees of the disk. None where it turns its back, for a point in its plane, and where it is far away
+    /// for its size: there an even choice by area is nearly one by solid angle.
     pub(super) fn seen_from(point: DVec3, centre: DVec3, normal: DVec3, radius: f64) -> Option<Self> {
         let (offset, across) = (centre - point, -normal);
         let height = offset.dot(across);
@@ -31,16 +31,16 @@ impl SphericalEllipse {
         if nearest > 16.0 * radius * radius || height < 1e-6 * radius {
             return None;
         }
-        // Straight above the middle what is left is rounding, and any way is outward. Elsewhere as little of `across` is left in it as
-        // f64 can tell.
+        // Straight above the middle what is left is rounding, and any way is outward. Elsewhere as little of `across`
+        // is left in it as f64 can tell.
         let outward = if middle > 1e-9 * height {
             let outward = along / middle;
             (outward - across * outward.dot(across)).normalize()
         } else {
             tangents(across)[0]
         };
-        // The nearest and the farthest end, in the plane through the point and the disk's axis. That of the cone divides the angle between them
-        // in halves, and so the diameter in the ratio of their distances.
+        // The nearest and the farthest end, in the plane through the point and the disk's axis. That of the cone
+        // divides the angle between them in halves, and so the diameter in the ratio of their distances.
         let ends = [middle - radius, middle + radius].map(|end| DVec2::new(end, height));
         let [near, far] = ends.map(DVec2::length);
         let met = DVec2::new(ends[0].x + 2.0 * radius * near / (near + far), height);
@@ -52,8 +52,8 @@ impl SphericalEllipse {
         Some(Self { axes: [x, z.cross(x), z], half, across, height, farthest: far })
     }
 
-    /// From the point to where a direction meets the disk, which `xi`, a point of the unit square, chooses, and how densely such directions
-    /// are chosen, per steradian.
+    /// From the point to where a direction meets the disk, which `xi`, a point of the unit square, chooses, and how
+    /// densely such directions are chosen, per steradian.
     pub(super) fn at(&self, xi: DVec2) -> (DVec3, f64) {
         let angle = xi.x * TAU;
         let rim = self.half * DVec2::new(libm::cos(angle), libm::sin(angle));
@@ -77,7 +77,8 @@ impl SphericalEllipse {
         self.pdf_to_rim(if share > 0.0 { side.length_squared() / share } else { self.half.x * self.half.x })
     }
 
-    /// Towards a point of the rim, as its direction is chosen evenly around the ellipse. It differs by a factor of 2 at most.
+    /// Towards a point of the rim, as its direction is chosen evenly around the ellipse. It differs by a factor of 2 at
+    /// most.
     fn pdf_to_rim(&self, squared: f64) -> f64 {
         (1.0 + cosine(squared)) / (TAU * self.half.x * self.half.y)
     }

@@ -1,9 +1,9 @@
 //! Surfaces that glow, as lights.
 //!
-//! Triangles, disks and boxes are patches: one light, of which a patch is chosen by its power and a point by area. Spheres, and ellipsoids that are
-//! round, are lights of their own, sampled by the cone they fill. What stands in a light's place is that light's body. Of
-//! all other shapes, of what moves, and of what a texture lights or cuts out, no points are chosen: rays find them by chance, which is as right, and
-//! noisier.
+//! Triangles, disks and boxes are patches: one light, of which a patch is chosen by its power and a point by area.
+//! Spheres, and ellipsoids that are round, are lights of their own, sampled by the cone they fill. What stands in a
+//! light's place is that light's body. Of all other shapes, of what moves, and of what a texture lights or cuts out, no
+//! points are chosen: rays find them by chance, which is as right, and noisier.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -109,8 +109,8 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
     for (instance, geometry) in placed(scene, is_emitter) {
         let material = &scene.materials[scene.geometries[geometry as usize].material() as usize];
         let moves = scene.instances[instance as usize].transform_end.is_some();
-        // Where it is bright only its texture knows, whether it is there at all its alpha, and where it is only the time: such
-        // a surface may be a light's body, but is no light of its own.
+        // Where it is bright only its texture knows, whether it is there at all its alpha, and where it is only the
+        // time: such a surface may be a light's body, but is no light of its own.
         let is_known = material.emission_texture.is_none() && material.alpha == Alpha::Opaque && !moves;
         let emission = is_known.then_some(material.emission);
         let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: 0, geometry, instance };

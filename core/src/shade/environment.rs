@@ -1,8 +1,9 @@
 //! Light from infinitely far, all around, sampled where it is bright.
 //!
-//! Directions are chosen by a pdf that is constant within each pixel: rows by how bright they are, then a pixel of
-//! the row (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 14.2.4). The picture is interpolated between pixels, so a
-//! pixel counts by the mean of the interpolation over it: then nothing bright has a pdf of 0, but for what is below 2^-24 of its row.
+//! Directions are chosen by a pdf that is constant within each pixel: rows by how bright they are, then a pixel of the
+//! row (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 14.2.4). The picture is interpolated between
+//! pixels, so a pixel counts by the mean of the interpolation over it: then nothing bright has a pdf of 0, but for what
+//! is below 2^-24 of its row.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;

@@ -1,9 +1,10 @@
-//! Homogeneous fog (as in Whitted-style renderers since Kajiya and Von Herzen 1984, *Ray tracing volume densities*, for a constant source): of
-//! radiance L, T L + (1 - T) C arrives after d metres, T = exp(-a d) by Beer's law, C being the fog's colour.
+//! Homogeneous fog (as in Whitted-style renderers since Kajiya and Von Herzen 1984, *Ray tracing volume densities*, for
+//! a constant source): of radiance L, T L + (1 - T) C arrives after d metres, T = exp(-a d) by Beer's law, C being the
+//! fog's colour.
 //!
-//! It is closed under composition: two stretches of fog in a row are as one of both lengths, so that what a path adds up
-//! does not depend on where it is cut. Scattering by chance, with a phase function, would light the fog by the lights, cast
-//! shadows into it, and cost a choice on every stretch.
+//! It is closed under composition: two stretches of fog in a row are as one of both lengths, so that what a path adds
+//! up does not depend on where it is cut. Scattering by chance, with a phase function, would light the fog by the
+//! lights, cast shadows into it, and cost a choice on every stretch.
 
 use crate::math::Vec3;
 use crate::scene::Fog;

@@ -1,6 +1,7 @@
 //! How much light arrives, and from where.
 //!
-//! Falloff follows the glTF extension [KHR_lights_punctual](https://github.com/KhronosGroup/glTF/blob/main/extensions/2.0/Khronos/KHR_lights_punctual/README.md):
+//! Falloff follows the glTF extension
+//! [KHR_lights_punctual](https://github.com/KhronosGroup/glTF/blob/main/extensions/2.0/Khronos/KHR_lights_punctual/README.md):
 //! a range window that reaches zero smoothly, and a spot whose edge is the square of a linear ramp in the cosine.
 
 use std::sync::Arc;
@@ -99,8 +100,8 @@ impl LightSource {
         }
     }
 
-    /// What arrives at `point` if nothing is in between; none where the light does not reach. Of an extended light a part is
-    /// asked that `xi`, a point of the unit square, chooses.
+    /// What arrives at `point` if nothing is in between; none where the light does not reach. Of an extended light a
+    /// part is asked that `xi`, a point of the unit square, chooses.
     pub fn sample(&self, point: DVec3, xi: DVec2) -> Option<LightSample> {
         match &self.kind {
             Kind::Light(light) => from_light(light, point, xi),

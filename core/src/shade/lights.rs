@@ -1,8 +1,9 @@
 //! All that lights a scene: its lights, what is around it and, for a path tracer, what glows.
 //!
-//! Whitted's recursion asks each of them. A path tracer asks one that is chosen by about how much it gives in the middle
-//! of the scene; a share of the choices is even, for the lights that matter elsewhere. What a scattered ray finds glowing by itself has
-//! a pdf in the light's terms as well, so that the two estimates can be weighed against each other.
+//! Whitted's recursion asks each of them. A path tracer asks one that is chosen by about how much it gives in the
+//! middle of the scene; a share of the choices is even, for the lights that matter elsewhere. What a scattered ray
+//! finds glowing by itself has a pdf in the light's terms as well, so that the two estimates can be weighed against
+//! each other.
 
 use std::sync::Arc;
 

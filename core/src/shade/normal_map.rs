@@ -1,8 +1,9 @@
-//! Normals from a texture (Blinn 1978, *Simulation of wrinkled surfaces*), in the frame that texture coordinates make, as glTF has it.
+//! Normals from a texture (Blinn 1978, *Simulation of wrinkled surfaces*), in the frame that texture coordinates make,
+//! as glTF has it.
 //!
-//! The frame is that of the triangle, or of the shape: u and v as directions along its surface. Tangents that a file gives at its
-//! vertices are not read: they are these, smoothed, and all but the files that were baked with others look the same. Where a map is
-//! turned or scaled on the surface, so is the frame: what it shows is bent as it is seen.
+//! The frame is that of the triangle, or of the shape: u and v as directions along its surface. Tangents that a file
+//! gives at its vertices are not read: they are these, smoothed, and all but the files that were baked with others look
+//! the same. Where a map is turned or scaled on the surface, so is the frame: what it shows is bent as it is seen.
 
 use super::{SurfacePoint, texture};
 use crate::math::{DAffine3, DVec3, Mat3, Vec2, tangents};
@@ -61,10 +62,11 @@ fn along_triangle([a, b, c]: [DVec3; 3], corners: [usize; 3], uvs: &[Vec2], map:
     (area != 0.0).then(|| [(e1 * second.y - e2 * first.y) * sign, (e2 * first.x - e1 * second.x) * sign])
 }
 
-/// The same along a shape at a point of it, in the shape's coordinates: by how its parameters change from one side of the point to the other.
+/// The same along a shape at a point of it, in the shape's coordinates: by how its parameters change from one side of
+/// the point to the other.
 fn along_shape(shape: &Shape, at: DVec3, map: &Texture) -> Option<[DVec3; 2]> {
-    // Steps are to be small against its radius of curvature, or against the whole of what is flat. And where parameters run around it, they begin again at 0 on the
-    // way.
+    // Steps are to be small against its radius of curvature, or against the whole of what is flat. And where parameters
+    // run around it, they begin again at 0 on the way.
     let size = || f64::from(shape.bounds().size().max_element());
     let (size, runs_around) = match shape {
         Shape::Plane(_) => (1.0, false),

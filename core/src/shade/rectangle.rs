@@ -1,5 +1,5 @@
-//! A rectangle as a point sees it: directions to it, chosen evenly by the solid angle that it fills (Ureña, Fajardo, King 2013, *An
-//! area-preserving parametrization for spherical rectangles*).
+//! A rectangle as a point sees it: directions to it, chosen evenly by the solid angle that it fills (Ureña, Fajardo,
+//! King 2013, *An area-preserving parametrization for spherical rectangles*).
 
 use std::f64::consts::TAU;
 
@@ -9,11 +9,13 @@ use crate::math::{DVec2, DVec3};
 pub(super) struct SphericalRectangle {
     /// Unit vectors along the edges, and across, to the point's side.
     axes: [DVec3; 3],
-    /// The rectangle in these axes, from the point: where it begins and ends along the first two, and where it lies on the third; below 0.
+    /// The rectangle in these axes, from the point: where it begins and ends along the first two, and where it lies on
+    /// the third; below 0.
     low: DVec2,
     high: DVec2,
     depth: f64,
-    /// Third components of the normals of the planes through the point and the edges that are parallel to the first axis.
+    /// Third components of the normals of the planes through the point and the edges that are parallel to the first
+    /// axis.
     lean: [f64; 2],
     /// Where the sum of angles begins.
     start: f64,
@@ -22,9 +24,9 @@ pub(super) struct SphericalRectangle {
 }
 
 impl SphericalRectangle {
-    /// What `point` sees of the rectangle around `centre` with half edges that are perpendicular, but for what f32 rounds. None where it is far
-    /// away for its size: there an even choice by area is nearly one by solid angle, and angles would be small differences. None, too,
-    /// where it turns its back, and for a point in its plane.
+    /// What `point` sees of the rectangle around `centre` with half edges that are perpendicular, but for what f32
+    /// rounds. None where it is far away for its size: there an even choice by area is nearly one by solid angle, and
+    /// angles would be small differences. None, too, where it turns its back, and for a point in its plane.
     pub(super) fn seen_from(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<Self> {
         let x = half_edges[0].normalize();
         let second = half_edges[1] - x * half_edges[1].dot(x);
@@ -36,7 +38,8 @@ impl SphericalRectangle {
         let (low, high) = (middle - half, middle + half);
         // From the point to the nearest one of the rectangle.
         let nearest = DVec2::ZERO.clamp(low, high).length_squared() + depth * depth;
-        // Half edges against whole distances: from twice its diagonal on, densities within it differ by a factor of 3.4 at most.
+        // Half edges against whole distances: from twice its diagonal on, densities within it differ by a factor of 3.4
+        // at most.
         if nearest > 16.0 * half.length_squared() || depth > -1e-6 * half.length() {
             return None;
         }

@@ -16,9 +16,11 @@ use crate::trace::{Placement, Primitives, World};
 /// three axes and rounded up.
 const TEST_ROUNDINGS: u32 = 32;
 
-/// Roundings by which such a test may be off in the height of a ray's origin above the plane, in units of the longest edge cubed over twice the area. Added up as if all were
-/// as large as they can be and on the same side they are 13; on planes of 1 to 10,000 units, seen and lit at all angles, Embree's rays met the plane again with a quarter (one in 160) and a half (one in 36,000), and not with 1.
-/// What is added here is missing from shadows of what stands on the triangle.
+/// Roundings by which such a test may be off in the height of a ray's origin above the plane, in units of the longest
+/// edge cubed over twice the area. Added up as if all were as large as they can be and on the same side they are 13; on
+/// planes of 1 to 10,000 units, seen and lit at all angles, Embree's rays met the plane again with a quarter (one
+/// in 160) and a half (one in 36,000), and not with 1. What is added here is missing from shadows of what stands on the
+/// triangle.
 const HEIGHT_ROUNDINGS: u32 = 4;
 
 /// What of a surface is wanted besides its position and its geometric normal.
@@ -52,11 +54,11 @@ pub struct SurfacePoint {
     pub normal: DVec3,
     /// Unit shading normal, on the same side; the geometric normal where the mesh has none or it is zero.
     pub shading_normal: DVec3,
-    /// From `position` to the smooth surface that normals of vertices stand for; zero where there is none, or where the triangle
-    /// bulges more than it does.
+    /// From `position` to the smooth surface that normals of vertices stand for; zero where there is none, or where the
+    /// triangle bulges more than it does.
     pub lift: DVec3,
-    /// Unit normal of the surface by which it is told on which side a direction leaves: where the surface is lifted, that
-    /// between the vertices; else the geometric one.
+    /// Unit normal of the surface by which it is told on which side a direction leaves: where the surface is lifted,
+    /// that between the vertices; else the geometric one.
     pub horizon: DVec3,
     /// Whether the viewer sees the front: triangles wind counter-clockwise (clockwise under a mirroring transform),
     /// shapes are seen from outside.
@@ -172,9 +174,9 @@ impl SurfacePoint {
         }
     }
 
-    /// Lifts the point to the smooth surface: to between the planes through the vertices, across their normals, where they are
-    /// above it (Hanika 2021, *Hacking the shadow terminator*, in Ray tracing gems II). Rays that left the triangle itself would
-    /// meet its neighbours where light grazes, and show them as dark facets.
+    /// Lifts the point to the smooth surface: to between the planes through the vertices, across their normals, where
+    /// they are above it (Hanika 2021, *Hacking the shadow terminator*, in Ray tracing gems II). Rays that left the
+    /// triangle itself would meet its neighbours where light grazes, and show them as dark facets.
     fn lift_over(&mut self, corners: &[DVec3; 3], normals: [DVec3; 3], weights: [f64; 3]) {
         let mut lift = DVec3::ZERO;
         for k in 0..3 {
@@ -202,15 +204,17 @@ impl SurfacePoint {
 
     /// A ray that leaves the surface and does not meet it again at once.
     ///
-    /// It starts beside `position`, lifted to the smooth surface if it leaves above, by the error bound, on the side `direction`
-    /// points to, and every coordinate is rounded away from the surface (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 3.9; Wächter and
-    /// Binder 2019, *A fast and robust method for avoiding self-intersection*). A fixed epsilon would be too small for
-    /// large scenes and would lose the shadows of small ones.
+    /// It starts beside `position`, lifted to the smooth surface if it leaves above, by the error bound, on the side
+    /// `direction` points to, and every coordinate is rounded away from the surface (Pharr, Jakob and Humphreys
+    /// 2016, *Physically Based Rendering* 3.9; Wächter and Binder 2019, *A fast and robust method for avoiding
+    /// self-intersection*). A fixed epsilon would be too small for large scenes and would lose the shadows of small
+    /// ones.
     pub fn spawn(&self, direction: Vec3, tmax: f32) -> Ray {
         Ray { origin: self.start(direction.as_dvec3()), direction, tmin: 0.0, tmax, time: self.time }
     }
 
-    /// How far beyond `position` a ray starts, along itself, that left the surface: by how much its way is longer than its t says.
+    /// How far beyond `position` a ray starts, along itself, that left the surface: by how much its way is longer than
+    /// its t says.
     pub fn ahead(&self, ray: &Ray) -> f32 {
         let direction = ray.direction.as_dvec3();
         ((ray.origin.as_dvec3() - self.position).dot(direction) / direction.length()) as f32
@@ -291,7 +295,8 @@ fn on_shape(ray: &Ray, placement: Option<&Placement>, shape: &Shape, t: f32) -> 
     let position = to_world.transform_point3(on_shape);
     let normal = cofactor(&to_world.matrix3) * shape.normal(on_shape);
     let outwards = normal.try_normalize().unwrap_or_else(|| -ray.direction.as_dvec3().normalize());
-    // Not relative to where the point is, for it may be zero: what f64 rounds off on the way there, and of the shape's own numbers; none of a plane.
+    // Not relative to where the point is, for it may be zero: what f64 rounds off on the way there, and of the shape's
+    // own numbers; none of a plane.
     let extent = shape.bounds().size().max(Vec3::ZERO).as_dvec3();
     let terms = to_world.matrix3.abs() * (from.abs() + along.abs() + extent);
     // Every engine tests shapes in f64, so f32 rounds nothing but where rays begin in the coordinates of an object.
@@ -314,8 +319,8 @@ fn select_root(shape: &Shape, ray: &Ray, t: f32) -> Option<ShapeHit> {
     Some(shape.hit_at(ray, nearest))
 }
 
-/// How far along `normal` f64 may have moved `position`, which was computed of `terms`, and f32 a ray's origin there on its way into the
-/// coordinates of a placed object, and back.
+/// How far along `normal` f64 may have moved `position`, which was computed of `terms`, and f32 a ray's origin there on
+/// its way into the coordinates of a placed object, and back.
 fn rounding_error(position: DVec3, normal: DVec3, placement: Option<&Placement>, terms: DVec3) -> f64 {
     let computed = gamma64(TEST_ROUNDINGS) * terms.dot(normal.abs());
     let Some(placement) = placement else { return computed };

@@ -138,8 +138,8 @@ enum Crossing {
     Exit,
 }
 
-/// A lateral surface and its end planes. On a rim two t meet, each of them rounded: there their order is that of exact arithmetic, by the signs that the
-/// surface's polynomial and its slope have where the line meets the end plane.
+/// A lateral surface and its end planes. On a rim two t meet, each of them rounded: there their order is that of exact
+/// arithmetic, by the signs that the surface's polynomial and its slope have where the line meets the end plane.
 struct Rims<'a, Q> {
     surface: &'a Q,
     ends: Ends<'a>,
@@ -149,7 +149,8 @@ struct Rims<'a, Q> {
 }
 
 impl<Q: Quadric> Rims<'_, Q> {
-    /// What two t that are one may differ by, relative to the larger, each being off by 2^-26 of itself; and as much again.
+    /// What two t that are one may differ by, relative to the larger, each being off by 2^-26 of itself; and as much
+    /// again.
     const DOUBT: f64 = 1.0 / (1 << 24) as f64;
 
     /// Whether a crossing, which is at about t, is between the planes, or on one of them.
@@ -194,8 +195,9 @@ impl<Q: Quadric> Rims<'_, Q> {
     }
 }
 
-/// The surface's polynomial and half its slope where the line meets an end plane, at t = n / s, times s^2: a n^2 + 2 b n s + c s^2, and s (a n + b s). Where the line is inside
-/// beyond the crossings, a is below 0, or 0, when one of them is at infinity; then the signs are turned round, for the first to be below 0 between the crossings.
+/// The surface's polynomial and half its slope where the line meets an end plane, at t = n / s, times s^2: a n^2 + 2 b
+/// n s + c s^2, and s (a n + b s). Where the line is inside beyond the crossings, a is below 0, or 0, when one of them
+/// is at infinity; then the signs are turned round, for the first to be below 0 between the crossings.
 struct AtEnd<'a, Q> {
     rims: &'a Rims<'a, Q>,
     end: usize,

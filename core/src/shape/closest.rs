@@ -1,10 +1,11 @@
 //! The point of a triangle that is nearest to a given one.
 //!
-//! It is the foot of the perpendicular where that is inside (Ericson 2005, *Real-Time Collision Detection*, 5.1.5), else on
-//! one of the edges (5.1.2). Ericson decides which of seven regions the point is in and computes one candidate; here all
-//! edges are, and the nearest wins: the regions' signs are noise in slivers and in triangles without an area, whose edges
-//! are sound. Ends of edges are taken in the order of their coordinates, so that triangles that share an edge compute the
-//! same bits, and a tie between them is one. `trace/bvh/near/measure.rs` does the same, of all edges at a time.
+//! It is the foot of the perpendicular where that is inside (Ericson 2005, *Real-Time Collision Detection*, 5.1.5),
+//! else on one of the edges (5.1.2). Ericson decides which of seven regions the point is in and computes one candidate;
+//! here all edges are, and the nearest wins: the regions' signs are noise in slivers and in triangles without an area,
+//! whose edges are sound. Ends of edges are taken in the order of their coordinates, so that triangles that share an
+//! edge compute the same bits, and a tie between them is one. `trace/bvh/near/measure.rs` does the same, of all edges
+//! at a time.
 
 use crate::math::DVec3;
 

@@ -2,14 +2,15 @@
 //!
 //! [`intersect`] lets a zero volume count as inside, so a ray through an edge or a corner hits every triangle there. To
 //! count crossings, the ray is moved aside by an infinitesimal (e, e^2, e^3), the same for all triangles (Edelsbrunner,
-//! Mücke 1990, *Simulation of simplicity*): it then passes through no edge, and what it crosses is what counts. Moved so,
-//! the volume d.(B x C) of the edge from B to C becomes d.(B x C) + (e, e^2, e^3).(d x (C - B)); where the first term is
-//! zero, the first component of d x (C - B) that is not has the sign. The direction stays, so a ray in a triangle's plane
-//! still misses it.
+//! Mücke 1990, *Simulation of simplicity*): it then passes through no edge, and what it crosses is what counts. Moved
+//! so, the volume d.(B x C) of the edge from B to C becomes d.(B x C) + (e, e^2, e^3).(d x (C - B)); where the first
+//! term is zero, the first component of d x (C - B) that is not has the sign. The direction stays, so a ray in a
+//! triangle's plane still misses it.
 //!
 //! A closed mesh is therefore crossed an even number of times from outside and an odd number from inside, always; a ray
-//! that touches an edge or a corner from one side crosses twice (in and out), or not at all. To keep one of the hits whose t
-//! differ by little, the simpler alternative, needs a tolerance, counts a touched silhouette once, and loses thin walls.
+//! that touches an edge or a corner from one side crosses twice (in and out), or not at all. To keep one of the hits
+//! whose t differ by little, the simpler alternative, needs a tolerance, counts a touched silhouette once, and loses
+//! thin walls.
 
 use super::exactly::Seen;
 use super::triangle::{Corners, TriangleHit, intersect, intersect_line};

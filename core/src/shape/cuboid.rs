@@ -105,8 +105,8 @@ impl Cuboid {
         DVec3::AXES[axis] * if is_upper { 1.0 } else { -1.0 }
     }
 
-    /// Over [0, 1] on each face, along the two axes that follow the face's own; on lower faces u runs the other way, so that a texture is
-    /// mirrored on none.
+    /// Over [0, 1] on each face, along the two axes that follow the face's own; on lower faces u runs the other way, so
+    /// that a texture is mirrored on none.
     pub(super) fn uv(&self, at: DVec3) -> DVec2 {
         let (axis, is_upper) = self.face(at);
         let size = (self.max.as_dvec3() - self.min.as_dvec3()).max(DVec3::splat(f64::MIN_POSITIVE));

@@ -1,11 +1,11 @@
 //! How far a hit is, and which of two is nearer, exactly.
 //!
-//! The t of a hit is an f64 that is off by at most 2^-26 of itself. Two that are farther apart are in order as they are.
-//! Of the others, and there are none but where surfaces all but touch, t is a fraction: with p a point of the plane that
-//! is hit and n its normal, t = (p - o) . n / d . n for a ray from o along d. Both its parts are sums of products of the
-//! numbers that are stored, and are computed without rounding (`Integers`, or [`Expansion`]); so are the products that tell which
-//! fraction is the smaller. Triangles of one plane are hit at exactly the same t, whatever the order of their corners; most show it
-//! at a glance (`are_coplanar`).
+//! The t of a hit is an f64 that is off by at most 2^-26 of itself. Two that are farther apart are in order as they
+//! are. Of the others, and there are none but where surfaces all but touch, t is a fraction: with p a point of the
+//! plane that is hit and n its normal, t = (p - o) . n / d . n for a ray from o along d. Both its parts are sums of
+//! products of the numbers that are stored, and are computed without rounding (`Integers`, or [`Expansion`]); so are
+//! the products that tell which fraction is the smaller. Triangles of one plane are hit at exactly the same t, whatever
+//! the order of their corners; most show it at a glance (`are_coplanar`).
 //!
 //! To compute t in more digits, the simpler alternative, would never say that two are equal.
 
@@ -30,8 +30,8 @@ pub struct Distance {
 /// What the t of a hit follows from.
 #[derive(Clone, Copy, Debug)]
 pub enum Support {
-    /// Nothing: t is what it is. So it is of round shapes, of shapes that are placed (where the ray in their coordinates is
-    /// rounded already), and of the textbooks' methods.
+    /// Nothing: t is what it is. So it is of round shapes, of shapes that are placed (where the ray in their
+    /// coordinates is rounded already), and of the textbooks' methods.
     Itself,
     /// It is not known here.
     Unknown,
@@ -43,8 +43,8 @@ pub enum Support {
     Plane(DVec3, DVec3),
 }
 
-/// How far apart two t may be, relative to the larger, whose order is not that of what they stand for: twice the error of
-/// each.
+/// How far apart two t may be, relative to the larger, whose order is not that of what they stand for: twice the error
+/// of each.
 const UNORDERED: f64 = 1.0 / (1 << 25) as f64;
 
 impl Support {
@@ -120,8 +120,9 @@ impl Distance {
     }
 }
 
-/// Whether two triangles with an area are seen to lie in one plane: by the same three corners, or by one component that all corners share. So nearly all
-/// surfaces show it that lie on each other: faces that a file holds twice, turned or not; floors, walls, and what lies on them.
+/// Whether two triangles with an area are seen to lie in one plane: by the same three corners, or by one component that
+/// all corners share. So nearly all surfaces show it that lie on each other: faces that a file holds twice, turned or
+/// not; floors, walls, and what lies on them.
 #[inline]
 pub(crate) fn are_coplanar(one: &[Vec3; 3], other: &[Vec3; 3]) -> bool {
     let is_same = |axis: usize| one.iter().chain(other).all(|corner| corner[axis] == one[0][axis]);
@@ -218,7 +219,8 @@ mod tests {
         }
     }
 
-    /// The same corners elsewhere are another plane, and what shares neither corners nor a coordinate is none at a glance.
+    /// The same corners elsewhere are another plane, and what shares neither corners nor a coordinate is none at a
+    /// glance.
     #[test]
     fn what_is_placed_elsewhere_is_not_as_far() {
         let corners = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];

@@ -1,5 +1,6 @@
-//! Triangles as a ray's line sees them, without rounding: in integers where their digits allow ([`Integers`]), else in expansions. Which of two is nearer
-//! is told here in integers alone; what has no room there is for [`super::distance`].
+//! Triangles as a ray's line sees them, without rounding: in integers where their digits allow ([`Integers`]), else in
+//! expansions. Which of two is nearer is told here in integers alone; what has no room there is for
+//! [`super::distance`].
 
 use std::cmp::Ordering;
 
@@ -222,7 +223,8 @@ mod tests {
         assert!(!fits(DVec3::splat(0.1), DVec3::splat(0.3), corners.map(|p| p / 3.0)));
     }
 
-    /// An object whose transform moves corners to f64 is seen in integers as it is in expansions; one that does not is not.
+    /// An object whose transform moves corners to f64 is seen in integers as it is in expansions; one that does not is
+    /// not.
     #[test]
     fn placed_corners_are_f64_or_none() {
         use crate::math::{Affine3, Vec3};

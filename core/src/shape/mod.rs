@@ -2,11 +2,15 @@
 //!
 //! Triangles go to the accelerators as meshes; every other shape is a variant of [`Shape`], which answers
 //! [`bounds`](Shape::bounds) and [`intersect`](Shape::intersect) for the native leaves and for Embree's user geometry
-//! alike. A closed family is an enum and not a trait object, so that the compiler lists what a new shape must reach. It does not list how it
-//! is made a [`Shape`] (`from_kinds` below) and named to users of the crates (both `lib.rs`), how it is read from a file (`DShape` and, if it is unbounded, `local_origin` in `src/io/dshape.rs`; `SINGLES` in
-//! `src/io/toml/primitives.rs`, under the name that [`Shape::name`] gives it, by which it is written as well), what other formats have for it (`check` in `src/io/save/nff.rs`), which
-//! kinds tests go through (`Kind` in `src/lab/shape_tests.rs`, `shapes` in `tests/shapes.rs`, `Kind` in `tests/accelerators/subjects.rs` and the lists in `matrix.rs` beside it, `TABLES` in `tests/io/local_origins.rs`,
-//! `primitive` in `tests/io/placements.rs`, the shapes in `core/src/shade/normal_map.rs`; `src/lab/stress/quadrics.rs`), what `scenes/primitives` shows, and what docs/SCENES.md says of it.
+//! alike. A closed family is an enum and not a trait object, so that the compiler lists what a new shape must reach. It
+//! does not list how it is made a [`Shape`] (`from_kinds` below) and named to users of the crates (both `lib.rs`), how
+//! it is read from a file (`DShape` and, if it is unbounded, `local_origin` in `src/io/dshape.rs`; `SINGLES` in
+//! `src/io/toml/primitives.rs`, under the name that [`Shape::name`] gives it, by which it is written as well), what
+//! other formats have for it (`check` in `src/io/save/nff.rs`), which kinds tests go through (`Kind` in
+//! `src/lab/shape_tests.rs`, `shapes` in `tests/shapes.rs`, `Kind` in `tests/accelerators/subjects.rs` and the lists in
+//! `matrix.rs` beside it, `TABLES` in `tests/io/local_origins.rs`, `primitive` in `tests/io/placements.rs`, the shapes
+//! in `core/src/shade/normal_map.rs`; `src/lab/stress/quadrics.rs`), what `scenes/primitives` shows, and what
+//! docs/SCENES.md says of it.
 
 mod axis;
 pub mod closest;

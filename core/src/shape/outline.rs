@@ -7,9 +7,9 @@
 //! volume d . (b x c), as for triangles. All signs are exact, so a ray through a corner is counted once, and a point on
 //! an edge or a corner is seen as such: it is inside. Two polygons that share an edge leave no gap.
 //!
-//! Of many corners, boxes around runs of them, in a binary tree, tell which edges the half-line's own line passes by: the
-//! sign of a box's corner that is farthest to a side is exact, too. An outline that runs to and fro across that line has all of
-//! its edges looked at.
+//! Of many corners, boxes around runs of them, in a binary tree, tell which edges the half-line's own line passes by:
+//! the sign of a box's corner that is farthest to a side is exact, too. An outline that runs to and fro across that
+//! line has all of its edges looked at.
 
 use std::ops::Range;
 
@@ -24,7 +24,8 @@ const RUN: usize = 16;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outline {
     corners: Vec<Vec3>,
-    /// Around runs of edges, where they are more than [`RUN`]: the children of box k are 2 k + 1 and 2 k + 2, each with half of its edges.
+    /// Around runs of edges, where they are more than [`RUN`]: the children of box k are 2 k + 1 and 2 k + 2, each with
+    /// half of its edges.
     boxes: Vec<Aabb>,
 }
 
@@ -130,7 +131,8 @@ impl Count<'_> {
         false
     }
 
-    /// Whether all of a box is to one side of the half-line's own line: the side grows with one coordinate, or falls, and so does it with another.
+    /// Whether all of a box is to one side of the half-line's own line: the side grows with one coordinate, or falls,
+    /// and so does it with another.
     fn passes_by(&self, bounds: &Aabb) -> bool {
         let (i, j) = ((self.along + 1) % 3, (self.along + 2) % 3);
         let (mut most, mut least) = (bounds.max, bounds.min);

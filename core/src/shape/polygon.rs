@@ -4,7 +4,8 @@
 //! itself. Four corners in f32 hardly ever lie in one plane: the polygon's is that of Newell's normal (Sutherland,
 //! Sproull, Schumacker 1974, *A characterization of ten hidden-surface algorithms*) through the mean of the corners, in
 //! f64, and corners may be off it by [`Polygon::FLATNESS`] of the polygon's size. Hits stay within the bounds of the
-//! corners. Triangulating, the simpler way, would choose among outlines that are not the polygon's where it is not flat.
+//! corners. Triangulating, the simpler way, would choose among outlines that are not the polygon's where it is not
+//! flat.
 
 use super::distance::Support;
 use super::flat::Flat;

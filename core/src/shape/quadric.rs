@@ -81,8 +81,8 @@ pub(super) mod tests {
     use crate::ray::Ray;
     use crate::shape::line::Line;
 
-    /// Holds the short form of the discriminant against its definition, in exact arithmetic. `quadric` makes one that is
-    /// seen from a line, of points that it may ask for by number.
+    /// Holds the short form of the discriminant against its definition, in exact arithmetic. `quadric` makes one that
+    /// is seen from a line, of points that it may ask for by number.
     #[track_caller]
     pub fn assert_discriminants<Q: Formula<5>>(quadric: impl Fn(Line, &dyn Fn(f32) -> DVec3) -> Q) {
         for i in 0..50 {

@@ -17,8 +17,8 @@ pub(super) fn disk_reach(normal: DVec3, radius: f64) -> DVec3 {
     DVec3::new(f64::hypot(y, z), f64::hypot(z, x), f64::hypot(x, y)) * radius
 }
 
-/// Longitude from -z about +y, and latitude from the south pole, both over [0, 1], of a unit vector: a map of the world is seen from outside as it
-/// is read, its middle at +z.
+/// Longitude from -z about +y, and latitude from the south pole, both over [0, 1], of a unit vector: a map of the world
+/// is seen from outside as it is read, its middle at +z.
 pub(super) fn spherical(n: DVec3) -> DVec2 {
     let latitude = libm::asin(n.y.clamp(-1.0, 1.0)) / std::f64::consts::PI;
     DVec2::new(turn(-n.x, -n.z), latitude + 0.5)

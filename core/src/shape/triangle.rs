@@ -6,8 +6,9 @@
 //! volume with the opposite sign, so a test that gets the signs right leaks neither at edges nor at vertices.
 //!
 //! The signs are right because each volume is computed in f64 with a bound on its rounding error, and where the bound
-//! cannot decide, in exact arithmetic (in integers, or [`Expansion`]). Woop's test alone, the simpler alternative, is watertight too,
-//! but decides for corners that its shear has rounded: it names a neighbour on a ray that passes near an edge.
+//! cannot decide, in exact arithmetic (in integers, or [`Expansion`]). Woop's test alone, the simpler alternative, is
+//! watertight too, but decides for corners that its shear has rounded: it names a neighbour on a ray that passes near
+//! an edge.
 //!
 //! A zero volume counts as inside; a ray in the triangle's plane and a triangle without an area miss.
 
@@ -38,7 +39,8 @@ impl TriangleHit {
     }
 }
 
-/// The weights of the second and the third corner, off by rounding, so that none of the three is negative: these are not below 0, and their sum, unrounded, is not above 1.
+/// The weights of the second and the third corner, off by rounding, so that none of the three is negative: these are
+/// not below 0, and their sum, unrounded, is not above 1.
 #[inline]
 pub(crate) fn weights_within(u: f64, v: f64) -> [f64; 2] {
     // Of the two zeros the one without a sign.
@@ -224,11 +226,12 @@ pub fn intersect_line<Co: Corners>(origin: DVec3, d: DVec3, corners: &Co) -> Opt
     Some(seen.hit())
 }
 
-/// What u and v of a sliver, or of a triangle that is small for its distance, may be off by: then they are computed exactly.
+/// What u and v of a sliver, or of a triangle that is small for its distance, may be off by: then they are computed
+/// exactly.
 const SLIVER_PRECISION: f64 = 1.0 / (1u64 << 20) as f64;
 
-/// The magnitude of a difference of corners, or of a corner and the origin, and of what its error is relative to besides: with
-/// u = 2^-53 it errs by 9 u (size + slack) at most, 8 for the corners and 1 for the subtraction.
+/// The magnitude of a difference of corners, or of a corner and the origin, and of what its error is relative to
+/// besides: with u = 2^-53 it errs by 9 u (size + slack) at most, 8 for the corners and 1 for the subtraction.
 struct Difference {
     size: DVec3,
     slack: DVec3,
@@ -237,8 +240,8 @@ struct Difference {
 impl Difference {
     /// What the error of the cross product, in f64, is relative to, by [`ROUNDING`].
     ///
-    /// The slack of a corner is as large as its coordinates, the sizes of two edges may be as small as the triangle: multiplying
-    /// sums of both would count slack times slack, which is an error of the second order.
+    /// The slack of a corner is as large as its coordinates, the sizes of two edges may be as small as the triangle:
+    /// multiplying sums of both would count slack times slack, which is an error of the second order.
     #[inline(always)]
     fn cross_error(&self, other: &Self, is_rounded: bool) -> DVec3 {
         if !is_rounded {
@@ -250,8 +253,8 @@ impl Difference {
     }
 }
 
-/// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
-/// the dot product; and the bound's own rounding.
+/// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3
+/// in the dot product; and the bound's own rounding.
 pub(crate) const ROUNDING: f64 = gamma64(32);
 
 /// A triangle as seen from the origin of a ray, in f64.
@@ -290,8 +293,8 @@ impl Seen {
         TriangleHit { t: height * inverse, u: volumes[1] * inverse, v: volumes[2] * inverse }
     }
 
-    /// The same hit with u and v that a corner which is much farther away than another does not spoil: each volume is that of the nearer end of its edge, and the
-    /// slope is their sum. None where that is not enough.
+    /// The same hit with u and v that a corner which is much farther away than another does not spoil: each volume is
+    /// that of the nearer end of its edge, and the slope is their sum. None where that is not enough.
     #[cold]
     #[inline(never)]
     fn hit_of_sliver(&self, d: DVec3) -> Option<TriangleHit> {
@@ -425,8 +428,8 @@ mod tests {
         assert!((a.t - b.t).abs() < 1e-6 && (a.u - b.u).abs() < 1e-6 && (a.v - b.v).abs() < 1e-6, "{a:?} {b:?}");
     }
 
-    /// Small triangles far from the origin, turned and scaled: what their corners are rounded by must not send every ray to
-    /// exact arithmetic.
+    /// Small triangles far from the origin, turned and scaled: what their corners are rounded by must not send every
+    /// ray to exact arithmetic.
     #[test]
     fn placed_triangles_are_mostly_decided_in_f64() {
         let mut state = 7u32;

@@ -1,10 +1,10 @@
 //! What a ray crosses, gathered in any order and put in order.
 //!
-//! Hits in the interior of triangles count as they come. Those on edges and in corners are gathered, and of the triangles of
-//! a part that touch there, in the same place and in the same sense, as many count as the ray crosses when it is moved
-//! aside ([`crate::shape::crossing`]): the lowest ids. The place is the edge or the corner itself, by the positions of
-//! its ends, not the t, which is rounded differently in each triangle; so no tolerance is needed, walls may be arbitrarily
-//! thin, and meshes whose triangles share positions but no indices are served alike.
+//! Hits in the interior of triangles count as they come. Those on edges and in corners are gathered, and of the
+//! triangles of a part that touch there, in the same place and in the same sense, as many count as the ray crosses when
+//! it is moved aside ([`crate::shape::crossing`]): the lowest ids. The place is the edge or the corner itself, by the
+//! positions of its ends, not the t, which is rounded differently in each triangle; so no tolerance is needed, walls
+//! may be arbitrarily thin, and meshes whose triangles share positions but no indices are served alike.
 //!
 //! Everything is in f64, which holds f32 exactly: one rule for scenes of either.
 

@@ -3,8 +3,8 @@
 use super::Part;
 use crate::error::{Error, Result};
 
-/// Primitives that may stand in one system of coordinates, that of the world or of an object: what a leaf of the native tracer's
-/// trees can name.
+/// Primitives that may stand in one system of coordinates, that of the world or of an object: what a leaf of the native
+/// tracer's trees can name.
 pub(crate) const MAX_PRIMITIVES: u64 = (1 << 29) - 1;
 
 /// Whether `what`, which has these parts, can be traced.

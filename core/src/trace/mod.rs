@@ -24,8 +24,8 @@ use crate::ray::{Hit, Ray};
 
 /// An engine that finds where rays meet a scene.
 ///
-/// Every engine obeys the same conventions: a hit counts for `tmin <= t <= tmax`; at equal t the lowest (instance, geometry, primitive)
-/// wins; a ray that [is not valid](Ray::is_valid) misses.
+/// Every engine obeys the same conventions: a hit counts for `tmin <= t <= tmax`; at equal t the lowest (instance,
+/// geometry, primitive) wins; a ray that [is not valid](Ray::is_valid) misses.
 ///
 /// The two required methods define the answer; the batch methods give the same answers for many rays at a time, and
 /// an engine overrides them where it has something faster.
@@ -36,7 +36,8 @@ pub trait Tracer: Sync {
     /// Whether there is any hit.
     fn occluded(&self, ray: &Ray) -> bool;
 
-    /// The nearest hit of each ray, into `hits` of the same length. All by the thread that calls: who has many rays hands parts of them to several.
+    /// The nearest hit of each ray, into `hits` of the same length. All by the thread that calls: who has many rays
+    /// hands parts of them to several.
     ///
     /// # Panics
     /// Where lengths differ.
@@ -62,8 +63,8 @@ pub trait Tracer: Sync {
 /// How a batch is traced. It changes the speed, never a native answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Batch {
-    /// Rays of a packet, for engines that trace packets; the native tracer chooses by itself: bundles where `coherent` promises some, else
-    /// flights of single rays, and each ray alone where they are few.
+    /// Rays of a packet, for engines that trace packets; the native tracer chooses by itself: bundles where `coherent`
+    /// promises some, else flights of single rays, and each ray alone where they are few.
     pub width: Width,
     /// Whether neighbours in the batch start and point alike.
     pub coherent: bool,
@@ -79,8 +80,9 @@ const ALIKE: f32 = 0.996;
 const NEAR: f32 = 0.05;
 
 impl Batch {
-    /// For rays of which nobody says how they lie: coherent where a sample of neighbours starts from the same points and points alike, as a camera's rays; or points
-    /// the same way and starts alike, as an orthographic camera's and those towards the sun.
+    /// For rays of which nobody says how they lie: coherent where a sample of neighbours starts from the same points
+    /// and points alike, as a camera's rays; or points the same way and starts alike, as an orthographic camera's and
+    /// those towards the sun.
     #[must_use]
     pub fn of(rays: &[Ray]) -> Self {
         let every = (rays.len() / SAMPLES).max(2);
@@ -97,7 +99,8 @@ impl Batch {
         let same_way = |pair: &[Ray]| pair[0].direction == pair[1].direction;
         let coherent = are_mostly(&from_one_point)
             || are_mostly(&same_way) && {
-                // By the golden section, so that it is not the same place of another row; in the middle of all, so that a ray far off does not count.
+                // By the golden section, so that it is not the same place of another row; in the middle of all, so that
+                // a ray far off does not count.
                 let other = |some: &[Ray]| some[every * 618 / 1000].origin.distance(some[0].origin);
                 let mut apart: Vec<f32> = samples().map(other).collect();
                 apart.sort_unstable_by(f32::total_cmp);
@@ -148,7 +151,8 @@ mod tests {
         let coherent = |rays: Vec<Ray>| Batch::of(&rays).coherent;
         assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way)).collect()));
         assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way * 1e-3)).collect()));
-        // Side by side, in pictures of all widths; here and there, by twos as well, and though one is far off; and each its own way.
+        // Side by side, in pictures of all widths; here and there, by twos as well, and though one is far off; and each
+        // its own way.
         let rows = |wide: usize| (0..4096).map(move |i| Vec3::new((i % wide) as f32, (i / wide) as f32, 0.0));
         for wide in [32, 60, 64, 100, 256, 1000, 1024] {
             assert!(coherent(rows(wide).map(|at| Ray::new(at, Vec3::Z)).collect()), "{wide}");

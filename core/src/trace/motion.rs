@@ -1,8 +1,9 @@
 //! Objects that move while the shutter is open.
 //!
-//! Two matrices are given, those of time 0 and 1; in between each entry is interpolated in f64 and rounded to f32, and what comes of it is the
-//! transform that a ray of that time meets, exactly. Turning by quaternions, the alternative, keeps lengths where an object turns far
-//! within one exposure, but vertices then run along curves, and no box around them is simple. Embree interpolates matrices as well.
+//! Two matrices are given, those of time 0 and 1; in between each entry is interpolated in f64 and rounded to f32, and
+//! what comes of it is the transform that a ray of that time meets, exactly. Turning by quaternions, the alternative,
+//! keeps lengths where an object turns far within one exposure, but vertices then run along curves, and no box around
+//! them is simple. Embree interpolates matrices as well.
 
 use std::borrow::Cow;
 
@@ -22,17 +23,20 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// None where the transform is singular on the way, at the time that is given then; or so nearly that f64 cannot tell.
+    /// None where the transform is singular on the way, at the time that is given then; or so nearly that f64 cannot
+    /// tell.
     pub(super) fn new(start: &Affine3, end: Affine3) -> Result<Self, f64> {
         let (a, b) = (start.as_daffine3().matrix3, end.as_daffine3().matrix3);
         let mut motion = Self { end, inverse: DMat3::ZERO, residual: 0.0 };
-        // A millionth of the volume that is there at the ends: a matrix that rounding alone keeps regular shows nothing.
+        // A millionth of the volume that is there at the ends: a matrix that rounding alone keeps regular shows
+        // nothing.
         let floor = 1e-6 * a.determinant().abs().min(b.determinant().abs());
         motion.include(&a, &b, [0.0, 1.0], floor)?;
         Ok(motion)
     }
 
-    /// Bounds the inverse between two times by halving, until the determinant keeps its sign in Bernstein's form, at least `floor` large.
+    /// Bounds the inverse between two times by halving, until the determinant keeps its sign in Bernstein's form, at
+    /// least `floor` large.
     fn include(&mut self, a: &DMat3, b: &DMat3, [from, to]: [f64; 2], floor: f64) -> Result<(), f64> {
         const SHORTEST: f64 = 1e-7;
         let middle = from.midpoint(to);
@@ -65,7 +69,8 @@ pub(super) fn singular_on_the_way(index: usize, name: &str, time: f64) -> Error 
     Error::Scene(format!("instance {index} ({name:?}) moves through a singular transform near time {time:.3}; {why}"))
 }
 
-/// The determinant of (1 - s) a + s b, a cubic, in Bernstein's form: it lies between the least and the largest of these.
+/// The determinant of (1 - s) a + s b, a cubic, in Bernstein's form: it lies between the least and the largest of
+/// these.
 fn determinants(a: &DMat3, b: &DMat3) -> [f64; 4] {
     let det = |x: DVec3, y: DVec3, z: DVec3| x.dot(y.cross(z));
     let one = |p: &DMat3, q: &DMat3| {
@@ -146,9 +151,10 @@ impl Placement {
         start.union(end)
     }
 
-    /// Boxes around the object at time 0 and at time 1; at all times in between it is within the box between these. Tighter than by its own box alone, of an
-    /// object of which more is known: `extents` are at least the scalar products of any of its points with
-    /// the rows of the given matrix, directions in the object's coordinates, and with the opposite ones.
+    /// Boxes around the object at time 0 and at time 1; at all times in between it is within the box between these.
+    /// Tighter than by its own box alone, of an object of which more is known: `extents` are at least the scalar
+    /// products of any of its points with the rows of the given matrix, directions in the object's coordinates, and
+    /// with the opposite ones.
     #[inline(always)]
     pub fn ends_of(&self, object: Aabb, extents: impl Fn(&DMat3) -> [DVec3; 2]) -> [Aabb; 2] {
         let Some(motion) = &self.motion else { return [bounds_placed(&self.to_world, object, extents); 2] };

@@ -43,8 +43,8 @@ impl Nearest {
         self.hit
     }
 
-    /// Whether an order could not be told, since a t was offered [by itself](Support::Unknown): then all must be offered
-    /// again with what their t follow from.
+    /// Whether an order could not be told, since a t was offered [by itself](Support::Unknown): then all must be
+    /// offered again with what their t follow from.
     #[inline]
     pub fn is_open(&self) -> bool {
         self.is_open

@@ -1,7 +1,8 @@
 //! How far rays that are rounded in objects may be from where they are in the world.
 //!
-//! Boxes of placed triangles are exact in the world. Those of placed shapes are not, since these are met by a ray that is rounded to
-//! f32 in the object ([`Placement::object_ray`]): it strays by |M| times what it strays in the object, with |o'| at most
+//! Boxes of placed triangles are exact in the world. Those of placed shapes are not, since these are met by a ray that
+//! is rounded to f32 in the object ([`Placement::object_ray`]): it strays by |M| times what it strays in the object,
+//! with |o'| at most
 //! |B| (|o| + |T|), M and T being the transform and B its inverse. The largest of that over all placements is linear in |o|: a matrix
 //! and a vector, found when the scene is built.
 
@@ -10,8 +11,8 @@ use super::motion::Extremes;
 use crate::math::{Aabb, DMat3, DVec3, UNIT_ROUNDOFF, gamma64};
 use crate::ray::Ray;
 
-/// How much of the coordinates a hit of a shape may lie beside where the ray is: 2^-24 for the rounding of the ray, and as much again
-/// for hits at rims, which may lie 2^-26 of their t beside the shape; twice that.
+/// How much of the coordinates a hit of a shape may lie beside where the ray is: 2^-24 for the rounding of the ray, and
+/// as much again for hits at rims, which may lie 2^-26 of their t beside the shape; twice that.
 pub(super) const SHAPE_ERROR: f64 = 4.0 * UNIT_ROUNDOFF as f64;
 
 /// The largest row sum of |B M - 1|, doubled, rounding and all; huge where the inverse is worth nothing.
@@ -41,8 +42,8 @@ impl Spread {
         let residual = if moved <= 1.0 { moved.max(residual(placement)) } else { 1e30 };
         let reach = bounds.min.abs().max(bounds.max.abs()).as_dvec3();
         let ones = DMat3::from_cols(DVec3::ONE, DVec3::ONE, DVec3::ONE);
-        // From the size of coordinates in the object to the error in the world. Origin and direction are rounded each, the latter for as long
-        // as the shape is away: at most the origin and the shape are together.
+        // From the size of coordinates in the object to the error in the world. Origin and direction are rounded each,
+        // the latter for as long as the shape is away: at most the origin and the shape are together.
         let error = forward * (DMat3::IDENTITY * (4.0 * SHAPE_ERROR) + ones * (2.0 * residual));
         let matrix = error * inverse;
         let constant = matrix * translation + error * reach;

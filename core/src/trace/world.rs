@@ -1,9 +1,10 @@
 //! The scene as the tracers hold it: recentred, f32, one or two levels.
 //!
 //! A [`Scene`] keeps f64 positions; tracers work in f32. So everything is moved by [`World::centre`] first, which keeps
-//! the shape of a mesh that lies far from zero. Groups that are placed once are baked into world coordinates and
-//! traced as one level; groups that are placed several times, that move, or whose shapes are scaled are kept once, with a
-//! transform for each placement. Baking all of them would make one level of every scene, and a million instances would cost a million meshes.
+//! the shape of a mesh that lies far from zero. Groups that are placed once are baked into world coordinates and traced
+//! as one level; groups that are placed several times, that move, or whose shapes are scaled are kept once, with a
+//! transform for each placement. Baking all of them would make one level of every scene, and a million instances would
+//! cost a million meshes.
 //!
 //! What stands here in f32 is *the* scene: exactness is judged against it, and an instanced triangle's corners are
 //! `to_world` times its f32 positions, in exact arithmetic.
@@ -124,7 +125,8 @@ impl World {
 }
 
 impl World {
-    /// A ray over [0, infinity] as tracers of this world take it: they know the scene recentred by [`World::centre`]. `origin` is in the scene's coordinates.
+    /// A ray over [0, infinity] as tracers of this world take it: they know the scene recentred by [`World::centre`].
+    /// `origin` is in the scene's coordinates.
     pub fn ray(&self, origin: DVec3, direction: Vec3) -> Ray {
         Ray::new(self.to_world(origin), direction)
     }
@@ -144,8 +146,9 @@ impl World {
     /// Recentres `scene` and decides what is baked.
     ///
     /// # Errors
-    /// [`Error::Scene`], or [`Error::Input`] where the scene was read from a file, for a group or a geometry that is not there; for an instance whose
-    /// transform is singular or not finite, with its name; and for more primitives in one place than tracers can name.
+    /// [`Error::Scene`], or [`Error::Input`] where the scene was read from a file, for a group or a geometry that is
+    /// not there; for an instance whose transform is singular or not finite, with its name; and for more primitives in
+    /// one place than tracers can name.
     ///
     /// # Panics
     /// Where a mesh names a vertex that is not there, here or when a tracer is built; [`Scene::check`] finds those.

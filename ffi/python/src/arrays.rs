@@ -17,19 +17,21 @@ use twincast::trace::precise::PreciseRay;
 /// Rays, or points, that a thread takes at a time.
 pub const CHUNK: usize = 1024;
 
-/// Shorter directions in f32, and origins farther away, are traced in f64: without them t is below 1e38, as meshes that are traced in f32 lie nearer than
-/// 1e14 (`trace::precise`); and no direction is denormal.
+/// Shorter directions in f32, and origins farther away, are traced in f64: without them t is below 1e38, as meshes that
+/// are traced in f32 lie nearer than 1e14 (`trace::precise`); and no direction is denormal.
 const SHORTEST: f32 = 1e-18;
 const FARTHEST: f32 = 1e19;
 
-/// What threads answer, of each ray or point so many numbers: an array that they write to a chunk at a time, and that is Python's afterwards.
+/// What threads answer, of each ray or point so many numbers: an array that they write to a chunk at a time, and that
+/// is Python's afterwards.
 pub struct Answers<'py, T: Element> {
     numbers: PyReadwriteArray1<'py, T>,
     width: usize,
 }
 
 impl<'py, T: Element + Send> Answers<'py, T> {
-    /// `count` times `width` zeros, which nobody has to write: pages that the system gives when they are touched, by the thread that answers.
+    /// `count` times `width` zeros, which nobody has to write: pages that the system gives when they are touched, by
+    /// the thread that answers.
     ///
     /// # Errors
     /// `MemoryError` where there is no room. For that NumPy makes them: a vector would end the process.

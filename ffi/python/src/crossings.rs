@@ -15,7 +15,8 @@ use crate::scene::{Scene, table};
 /// All hits, by ray, then by t: ray, primitive, location.
 type Crossings<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>);
 
-/// All hits, by ray, then by t: where those of each ray begin and the last ones end; ray, primitive, geometry; t, (u, v).
+/// All hits, by ray, then by t: where those of each ray begin and the last ones end; ray, primitive, geometry; t, (u,
+/// v).
 type List<'py> = (
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray1<u32>>,

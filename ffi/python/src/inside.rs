@@ -17,8 +17,9 @@ fn direction(sample: usize) -> DVec3 {
 }
 
 impl Scene {
-    /// Whether each point is inside of meshes that are closed when they are [`counted`](Scene::counted); `squares` are the points' squared distances from these, or NaN. A ball around a point that holds no triangle is all inside or all outside,
-    /// so of points along a curve few need be asked.
+    /// Whether each point is inside of meshes that are closed when they are [`counted`](Scene::counted); `squares` are
+    /// the points' squared distances from these, or NaN. A ball around a point that holds no triangle is all inside or
+    /// all outside, so of points along a curve few need be asked.
     pub fn are_inside_closed(&self, counted: &PreciseScene, points: &[DVec3], squares: &[f64], inside: &mut [bool]) {
         // Points that are asked, and of each point which of them tells.
         let (mut asked, mut tells) = (Vec::new(), Vec::with_capacity(points.len()));

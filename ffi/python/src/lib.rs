@@ -1,5 +1,5 @@
-//! `twincast._native`: the native tracer for Python. Arrays in, arrays out; what users see is the Python package over it
-//! (`python/twincast/`), which checks shapes, converts types and has the documentation.
+//! `twincast._native`: the native tracer for Python. Arrays in, arrays out; what users see is the Python package over
+//! it (`python/twincast/`), which checks shapes, converts types and has the documentation.
 //!
 //! | file | what |
 //! | --- | --- |
@@ -11,8 +11,9 @@
 //! | `points`, `order`, `inside` | what can be asked of points, in which order it is done, and which of them are inside |
 //! | `render` | pictures |
 //!
-//! There is no unsafe code here: a panic becomes a Python exception in PyO3's wrappers, so it never crosses the boundary. An array
-//! that another thread writes to while it is read gives numbers that are neither the old nor the new ones; its length cannot change.
+//! There is no unsafe code here: a panic becomes a Python exception in PyO3's wrappers, so it never crosses the
+//! boundary. An array that another thread writes to while it is read gives numbers that are neither the old nor the new
+//! ones; its length cannot change.
 #![forbid(unsafe_code)]
 
 mod arrays;

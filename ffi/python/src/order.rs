@@ -1,11 +1,13 @@
 //! Points in an order in which one is near the next.
 //!
-//! What is asked of a point leads to a few kilobytes of the tree. Asked in the order in which they came, which is often none, most of
-//! these are fetched from far; along Morton's curve (1966, *A computer oriented geodetic data base*) the next one finds them where they
-//! are. On a mesh of 100,000 triangles distances then take half of the time. Cells are so large that a few points
-//! share one, which is as good as the finest order, and keys are counted, which costs less than to compare them.
+//! What is asked of a point leads to a few kilobytes of the tree. Asked in the order in which they came, which is often
+//! none, most of these are fetched from far; along Morton's curve (1966, *A computer oriented geodetic data base*) the
+//! next one finds them where they are. On a mesh of 100,000 triangles distances then take half of the time. Cells are
+//! so large that a few points share one, which is as good as the finest order, and keys are counted, which costs less
+//! than to compare them.
 //!
-//! Rays are not sorted: many are in flight together, so that none waits for long, and to sort them costs more than it saves.
+//! Rays are not sorted: many are in flight together, so that none waits for long, and to sort them costs more than it
+//! saves.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -90,7 +92,8 @@ impl Order {
     }
 }
 
-/// Answers to so many questions, as they come in `order`; `ask` gets the numbers of up to `chunk` at a time, and answers that say `none`.
+/// Answers to so many questions, as they come in `order`; `ask` gets the numbers of up to `chunk` at a time, and
+/// answers that say `none`.
 pub fn along<T: Copy + Send + Sync>(
     count: usize,
     order: Option<&Order>,

@@ -25,14 +25,15 @@ type Nearest<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// The distance of a point whose square is told, which is infinite from 1e154 on: from there all that can be met is as near as zero.
+/// The distance of a point whose square is told, which is infinite from 1e154 on: from there all that can be met is as
+/// near as zero.
 fn root(squared: f64, point: DVec3) -> f64 {
     let most = point.abs().max_element();
     if squared == f64::INFINITY && most.is_finite() { (point / most).length() * most } else { squared.sqrt() }
 }
 
-/// What `ask` answers of the points, in their order; it gets some that are near each other at a time, and answers that say `none`, as all do once it
-/// is called off.
+/// What `ask` answers of the points, in their order; it gets some that are near each other at a time, and answers that
+/// say `none`, as all do once it is called off.
 fn along<T: Copy + Send + Sync>(
     rows: &Rows<'_>,
     cancel: &AtomicBool,
@@ -153,8 +154,8 @@ impl Scene {
         Ok(told.flat())
     }
 
-    /// Whether each point is inside: the majority of `samples` rays from it cross the meshes an odd number of times. With `both_ways`
-    /// a ray and its opposite must, which keeps points before the holes of an open mesh outside.
+    /// Whether each point is inside: the majority of `samples` rays from it cross the meshes an odd number of times.
+    /// With `both_ways` a ray and its opposite must, which keeps points before the holes of an open mesh outside.
     #[pyo3(signature = (points, samples = 1, both_ways = false, threads = 0))]
     fn inside<'py>(
         &self,

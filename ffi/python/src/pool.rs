@@ -1,8 +1,8 @@
 //! The threads that queries run on.
 //!
-//! Rayon's global pool would be shared with every other extension, and after a `fork` (Python's `multiprocessing` on Linux) its threads
-//! are gone and the first query would wait for ever. So each process has pools of its own, one for each number of threads that was asked for, of
-//! which the last few are kept.
+//! Rayon's global pool would be shared with every other extension, and after a `fork` (Python's `multiprocessing` on
+//! Linux) its threads are gone and the first query would wait for ever. So each process has pools of its own, one for
+//! each number of threads that was asked for, of which the last few are kept.
 
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,7 +23,8 @@ struct Entry {
     pool: Arc<ThreadPool>,
 }
 
-/// Those that were used last, the last one at the end. Only locked with the interpreter's lock held, so that nobody forks meanwhile.
+/// Those that were used last, the last one at the end. Only locked with the interpreter's lock held, so that nobody
+/// forks meanwhile.
 static POOLS: Mutex<Vec<Entry>> = Mutex::new(Vec::new());
 
 /// So many pools are kept, for a program that takes turns between a few numbers of threads.
@@ -67,7 +68,8 @@ pub fn run<T: Send>(py: Python<'_>, threads: usize, work: impl FnOnce() -> T + S
     Ok(py.detach(|| pool.install(work)))
 }
 
-/// The same for work that may be called off: it is told so where Python has a signal to handle, whose exception is the result then.
+/// The same for work that may be called off: it is told so where Python has a signal to handle, whose exception is the
+/// result then.
 pub fn interruptible<T: Send>(
     py: Python<'_>,
     threads: usize,
@@ -96,8 +98,9 @@ pub fn interruptible<T: Send>(
     }
 }
 
-/// Does all tasks, on so many threads, without the interpreter's lock; one by itself here, where there is [room](crate::stack) for it, since to hand it
-/// to another thread would take longer than a few rays do. What is left is not done once Python has a signal to handle, whose exception is the result.
+/// Does all tasks, on so many threads, without the interpreter's lock; one by itself here, where there is
+/// [room](crate::stack) for it, since to hand it to another thread would take longer than a few rays do. What is left
+/// is not done once Python has a signal to handle, whose exception is the result.
 pub fn each<I: IndexedParallelIterator>(
     py: Python<'_>,
     threads: usize,

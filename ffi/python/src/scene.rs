@@ -118,8 +118,8 @@ impl Scene {
         Ok(answers.flat())
     }
 
-    /// The nearest hits in f32; a miss has t infinite, ids `INVALID` and zeros. Normals are those of triangles, of unit length if
-    /// `normalize`.
+    /// The nearest hits in f32; a miss has t infinite, ids `INVALID` and zeros. Normals are those of triangles, of unit
+    /// length if `normalize`.
     #[pyo3(signature = (origins, directions, tmin = 0.0, tmax = Ends::All(f64::INFINITY), normalize = true, threads = 0))]
     #[allow(clippy::too_many_arguments)] // Python's keywords.
     fn cast<'py>(
@@ -185,7 +185,8 @@ impl Scene {
         Ok((t.flat(), uv.rows()?, primitive.flat(), geometry.flat()))
     }
 
-    /// The normals of triangles, of unit length; zero for `INVALID`, for what is not there, and for triangles without an area.
+    /// The normals of triangles, of unit length; zero for `INVALID`, for what is not there, and for triangles without
+    /// an area.
     #[pyo3(signature = (geometry, primitive, threads = 0))]
     fn normals<'py>(
         &self,
@@ -230,8 +231,8 @@ fn normal([a, b, c]: [DVec3; 3], normalize: bool) -> DVec3 {
 }
 
 impl Scene {
-    /// What counts are taken of: the meshes without triangles that repeat others. When it is first asked it is looked for these, on so many threads, without
-    /// the interpreter's lock.
+    /// What counts are taken of: the meshes without triangles that repeat others. When it is first asked it is looked
+    /// for these, on so many threads, without the interpreter's lock.
     pub fn counted(&self, py: Python<'_>, threads: usize) -> PyResult<&PreciseScene> {
         if self.precise.knows_distinct() {
             return Ok(self.precise.distinct());
@@ -239,8 +240,9 @@ impl Scene {
         pool::run(py, threads, || self.precise.distinct())
     }
 
-    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers, as `real` has them. In steps, in each of which the
-    /// processor waits for many cache lines together: the indices of some triangles, then their corners, and only then is anything computed.
+    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers, as `real`
+    /// has them. In steps, in each of which the processor waits for many cache lines together: the indices of some
+    /// triangles, then their corners, and only then is anything computed.
     pub fn normals_of<F>(
         &self,
         primitive: &[u32],

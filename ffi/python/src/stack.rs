@@ -1,7 +1,8 @@
 //! Whether a thread that somebody else has made has room for a query on its stack.
 //!
-//! A query takes up to half a mebibyte, even of one ray, and threads may have been given a quarter of one (`threading.stack_size`). Of its own threads
-//! a process can be asked by unsafe code alone; but the stack of its first one grows up to a limit that the system tells.
+//! A query takes up to half a mebibyte, even of one ray, and threads may have been given a quarter of one
+//! (`threading.stack_size`). Of its own threads a process can be asked by unsafe code alone; but the stack of its first
+//! one grows up to a limit that the system tells.
 
 use std::fs;
 use std::process;

@@ -16,7 +16,8 @@ pub struct Buffer {
     layout: Option<Layout>,
 }
 
-// SAFETY: the memory is written by the caller and read while a scene is committed; that these do not meet is the interface's rule.
+// SAFETY: the memory is written by the caller and read while a scene is committed; that these do not meet is the
+// interface's rule.
 unsafe impl Send for Buffer {}
 // SAFETY: as above.
 unsafe impl Sync for Buffer {}
@@ -76,7 +77,8 @@ pub struct Items {
 }
 
 impl Items {
-    /// Where the last item ends. What comes after it up to the next one's place, such as other data of an interleaved buffer, is not there.
+    /// Where the last item ends. What comes after it up to the next one's place, such as other data of an interleaved
+    /// buffer, is not there.
     pub fn end(&self) -> Result<usize> {
         let Some(before) = self.count.checked_sub(1) else { return Ok(0) };
         let last = self.stride.checked_mul(before).and_then(|bytes| bytes.checked_add(self.offset));
@@ -140,7 +142,8 @@ impl View {
     #[inline]
     pub fn words<const N: usize>(&self, index: usize) -> Option<[u32; N]> {
         let item = self.item(index, 4 * N)?;
-        // SAFETY: the item has that many bytes, and lies in the buffer, which the caller promised to be so large, and alive.
+        // SAFETY: the item has that many bytes, and lies in the buffer, which the caller promised to be so large, and
+        // alive.
         Some(unsafe { item.cast::<[u32; N]>().read_unaligned() })
     }
 

@@ -24,7 +24,8 @@ impl<F: Default> Default for Callback<F> {
     }
 }
 
-// SAFETY: the pointer is never followed here, only handed back; that callbacks may come from any thread is part of the interface.
+// SAFETY: the pointer is never followed here, only handed back; that callbacks may come from any thread is part of the
+// interface.
 unsafe impl<F: Send> Send for Callback<F> {}
 // SAFETY: as above.
 unsafe impl<F: Sync> Sync for Callback<F> {}
@@ -48,7 +49,8 @@ pub struct Device {
     verbose: bool,
 }
 
-/// The threads that build. A process that was forked from the one that made them has none of them, and to wait for these would be for ever: it gets its own.
+/// The threads that build. A process that was forked from the one that made them has none of them, and to wait for
+/// these would be for ever: it gets its own.
 struct Threads {
     /// The process in which the others are.
     process: u32,
@@ -121,8 +123,8 @@ fn pool(count: usize) -> Result<ThreadPool> {
 }
 
 impl Device {
-    /// From a configuration such as `threads=4,verbose=1`. Names that are not known, or mean nothing here, are passed over, as Embree does
-    /// with most.
+    /// From a configuration such as `threads=4,verbose=1`. Names that are not known, or mean nothing here, are passed
+    /// over, as Embree does with most.
     ///
     /// # Errors
     /// For one of these two that has a value which does not begin with a whole number, which is told without a device.
@@ -169,7 +171,8 @@ impl Device {
             eprintln!("twincast-rtc: error {code}: {}", failure.message);
         }
         if let Some(function) = function {
-            // SAFETY: the caller promised a function of this type that may be called with its pointer; the message lives until it returns.
+            // SAFETY: the caller promised a function of this type that may be called with its pointer; the message
+            // lives until it returns.
             unsafe { function(user, code, message.as_ptr()) };
         }
     }

@@ -1,8 +1,8 @@
 //! Errors as Embree tells them, and the wall at which everything that unwinds stops.
 //!
-//! A function of the interface has no error to return: the error is kept until `rtcGetDeviceError` fetches it, the first one for each
-//! thread, and told to the device's error function at once. Where there is no device (a null handle), it is kept
-//! for the thread alone.
+//! A function of the interface has no error to return: the error is kept until `rtcGetDeviceError` fetches it, the
+//! first one for each thread, and told to the device's error function at once. Where there is no device (a null
+//! handle), it is kept for the thread alone.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -65,8 +65,8 @@ pub fn take_homeless() -> u32 {
 }
 
 /// Runs what a function of the interface does. `device` is asked only after an error. A panic, which is a bug of this
-/// library, is told as an unknown error; it must not unwind into code that knows nothing of it. An exception that the error function throws is the
-/// caller's own, and goes through.
+/// library, is told as an unknown error; it must not unwind into code that knows nothing of it. An exception that the
+/// error function throws is the caller's own, and goes through.
 #[inline(always)]
 pub fn guard<'a, T>(default: T, device: impl FnOnce() -> Option<&'a Device>, work: impl FnOnce() -> Result<T>) -> T {
     match catch_unwind(AssertUnwindSafe(work)) {

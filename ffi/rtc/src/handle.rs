@@ -1,7 +1,7 @@
 //! What C holds: pointers that count references.
 //!
-//! A handle is an [`Arc`] as a raw pointer, so that retain and release are its own counting, and objects that refer to each other
-//! (a scene to its geometries, an instance to its scene) count along with the caller.
+//! A handle is an [`Arc`] as a raw pointer, so that retain and release are its own counting, and objects that refer to
+//! each other (a scene to its geometries, an instance to its scene) count along with the caller.
 
 use std::sync::Arc;
 
@@ -15,8 +15,8 @@ pub fn new<T>(object: Arc<T>) -> *const T {
 /// The object behind a handle.
 ///
 /// # Safety
-/// `handle` is null, or came from [`new`] and was not released as often as it was made and retained; and stays so as long as the
-/// result is used.
+/// `handle` is null, or came from [`new`] and was not released as often as it was made and retained; and stays so as
+/// long as the result is used.
 pub unsafe fn borrow<'a, T>(handle: *const T) -> Result<&'a T> {
     // SAFETY: by what the caller promises it is null or points to a living object.
     unsafe { handle.as_ref() }.ok_or_else(|| Failure::argument("invalid argument"))

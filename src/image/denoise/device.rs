@@ -53,8 +53,8 @@ impl<'l> Device<'l> {
         unsafe { (self.functions.device_int)(self.handle, c"version".as_ptr()) }
     }
 
-    /// Runs the filter for ray-traced pictures over inputs that are called so, with these flags set. All have `size` pixels, and
-    /// so has the result.
+    /// Runs the filter for ray-traced pictures over inputs that are called so, with these flags set. All have `size`
+    /// pixels, and so has the result.
     pub(super) fn run(
         &self,
         size: [u32; 2],
@@ -75,9 +75,10 @@ impl<'l> Device<'l> {
             // SAFETY: the handle is alive as long as the filter, and the name ends with a zero.
             unsafe { (self.functions.set_filter_bool)(filter.handle, flag.as_ptr(), true) };
         }
-        // SAFETY: `progress` gets what it expects, the place of a `Watch`, which outlives the filter. The library calls it only
-        // within the calls below. What it reads and writes there are the pixels of `inputs` and `output`, which are borrowed or
-        // owned here for longer, of the sizes that were told; it writes to `output` alone, and nothing else reads that meanwhile.
+        // SAFETY: `progress` gets what it expects, the place of a `Watch`, which outlives the filter. The library calls
+        // it only within the calls below. What it reads and writes there are the pixels of `inputs` and `output`, which
+        // are borrowed or owned here for longer, of the sizes that were told; it writes to `output` alone, and nothing
+        // else reads that meanwhile.
         unsafe {
             (self.functions.set_filter_progress)(
                 filter.handle,
@@ -122,7 +123,8 @@ impl<'d> Filter<'d> {
     /// Shares pixels with the filter. They must live until it has been executed for the last time.
     fn set_image(&self, name: &CStr, pixels: *mut [f32; 3], [width, height]: [usize; 2]) {
         let set = self.device.functions.set_shared_filter_image;
-        // SAFETY: the handle is alive as long as the filter, and the name ends with a zero. The pixels are only noted here.
+        // SAFETY: the handle is alive as long as the filter, and the name ends with a zero. The pixels are only noted
+        // here.
         unsafe { set(self.handle, name.as_ptr(), pixels.cast(), FLOAT3, width, height, 0, 0, 0) }
     }
 }

@@ -1,8 +1,9 @@
 //! Open Image Denoise as a file: where it is looked for, and its functions by their names.
 //!
-//! Versions 1.4 and 2 differ in how the functions that set numbers are called, `oidnSetFilter1b` or `oidnSetFilterBool`; in version 2 the former are inline functions
-//! of the header. Both are asked for. What they take is the same (A. T. Áfra and others, `include/OpenImageDenoise/oidn.h` of 1.4.3 and 2.3). Before 1.4 normals had another
-//! range, and guides could not be denoised.
+//! Versions 1.4 and 2 differ in how the functions that set numbers are called, `oidnSetFilter1b` or
+//! `oidnSetFilterBool`; in version 2 the former are inline functions of the header. Both are asked for. What they take
+//! is the same (A. T. Áfra and others, `include/OpenImageDenoise/oidn.h` of 1.4.3 and 2.3). Before 1.4 normals had
+//! another range, and guides could not be denoised.
 #![allow(unsafe_code, reason = "opening a shared library, and saying of which types its functions are")]
 
 use std::ffi::{c_char, c_int, c_void};
@@ -39,7 +40,8 @@ pub(super) struct Functions {
     pub(super) commit_device: unsafe extern "C" fn(Handle),
     pub(super) release_device: unsafe extern "C" fn(Handle),
     pub(super) new_filter: unsafe extern "C" fn(Handle, *const c_char) -> Option<Handle>,
-    /// Name, pixels, format, width, height, offset, and bytes from pixel to pixel and from row to row, 0 for packed ones.
+    /// Name, pixels, format, width, height, offset, and bytes from pixel to pixel and from row to row, 0 for packed
+    /// ones.
     pub(super) set_shared_filter_image:
         unsafe extern "C" fn(Handle, *const c_char, *mut c_void, c_int, usize, usize, usize, usize, usize),
     pub(super) set_filter_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
@@ -68,8 +70,8 @@ impl Library {
         };
         let mut refusals = Vec::new();
         for place in &places {
-            // SAFETY: what a library does when it is loaded is up to whoever installed it under this name, or named it in
-            // the environment, as with every library that a program is linked with.
+            // SAFETY: what a library does when it is loaded is up to whoever installed it under this name, or named it
+            // in the environment, as with every library that a program is linked with.
             match unsafe { loading::open(place, RTLD_NOW) } {
                 Ok(file) => return Self::new(file, place),
                 Err(words) => refusals.push(reason(words, place)),
@@ -108,8 +110,8 @@ impl Library {
 impl Functions {
     /// Those of a library; the name of one that it lacks.
     fn of(file: &File) -> std::result::Result<Self, &'static str> {
-        // SAFETY: each name is Open Image Denoise's own for a function of the type of the field it is put into, in every
-        // version from 1.4 on, as its headers have it; that the file is that library is vouched for by its name.
+        // SAFETY: each name is Open Image Denoise's own for a function of the type of the field it is put into, in
+        // every version from 1.4 on, as its headers have it; that the file is that library is vouched for by its name.
         unsafe {
             Ok(Self {
                 new_device: function(file, &["oidnNewDevice"])?,

@@ -6,14 +6,15 @@
 //! | `device` | one run of the network over pictures of one size |
 //! | `absent` | stands for both in a build without the feature `oidn` |
 //!
-//! A picture is denoised as linear radiance, guided by albedo and normals of what its pixels show. These are averages over samples,
-//! noisy wherever a lens, a shutter or thin things make them so. So each guide is denoised by itself first, and the picture by guides that are
-//! declared clean, which is what the library's documentation recommends for final pictures. Guides as they come, the
-//! simpler way, take a third of the time, and leave their noise in the picture or blur what they were to keep.
+//! A picture is denoised as linear radiance, guided by albedo and normals of what its pixels show. These are averages
+//! over samples, noisy wherever a lens, a shutter or thin things make them so. So each guide is denoised by itself
+//! first, and the picture by guides that are declared clean, which is what the library's documentation recommends for
+//! final pictures. Guides as they come, the simpler way, take a third of the time, and leave their noise in the picture
+//! or blur what they were to keep.
 //!
-//! The library is opened when a picture is to be denoised, and a build needs nothing of it: Debian 12 has no package, and who renders without
-//! denoising must not need one. The crate `oidn` links one version at build time. It runs on the processor: a graphics card's
-//! results differ in their last bits, and would need other memory.
+//! The library is opened when a picture is to be denoised, and a build needs nothing of it: Debian 12 has no package,
+//! and who renders without denoising must not need one. The crate `oidn` links one version at build time. It runs on
+//! the processor: a graphics card's results differ in their last bits, and would need other memory.
 
 #[cfg(not(feature = "oidn"))]
 mod absent;
@@ -76,8 +77,8 @@ impl Denoiser {
     /// Opens the library that [`VARIABLE`] names, else the one that the system finds.
     ///
     /// # Errors
-    /// [`Error::Unavailable`] where there is none, it is older than 1.4 or has no use for this processor, and in a build without
-    /// the feature `oidn`.
+    /// [`Error::Unavailable`] where there is none, it is older than 1.4 or has no use for this processor, and in a
+    /// build without the feature `oidn`.
     pub fn find() -> Result<Self> {
         let named = std::env::var_os(VARIABLE).filter(|path| !path.is_empty());
         Library::open(named.as_deref().map(Path::new)).map(Self)
@@ -97,8 +98,8 @@ impl Denoiser {
         format!("Open Image Denoise {major}.{minor}.{patch}")
     }
 
-    /// The picture without its noise, by as many threads as rayon's current pool has. Alpha stays, and so does what no surface
-    /// covers at all.
+    /// The picture without its noise, by as many threads as rayon's current pool has. Alpha stays, and so does what no
+    /// surface covers at all.
     ///
     /// # Errors
     /// [`Error::Interrupted`] once `watch` says so; [`Error::Backend`] with the library's own words where it fails; and

@@ -28,7 +28,8 @@ impl<'a, T> Slice<'a, T> {
         if self.length == 0 {
             return &[];
         }
-        // SAFETY: so many values are there for 'a: of a Rust slice by `from`, of the shim's by the comments in its header.
+        // SAFETY: so many values are there for 'a: of a Rust slice by `from`, of the shim's by the comments in its
+        // header.
         unsafe { std::slice::from_raw_parts(self.data, self.length) }
     }
 }
@@ -134,7 +135,8 @@ struct File {
     _its_own: [u8; 0],
 }
 
-/// The shim's functions. Each reads what it is given during the call alone, keeps none of it, and lets no exception out.
+/// The shim's functions. Each reads what it is given during the call alone, keeps none of it, and lets no exception
+/// out.
 #[repr(C)]
 #[derive(Debug)]
 pub(super) struct Functions {
@@ -160,7 +162,8 @@ impl Functions {
     }
 
     pub(super) fn write(&self, path: &Path, layout: &Layout, attributes: &Attributes, samples: &[u8]) -> Result<()> {
-        // SAFETY: all of it is there during the call; the shim checks that there are as many samples as the layout says.
+        // SAFETY: all of it is there during the call; the shim checks that there are as many samples as the layout
+        // says.
         result(unsafe { (self.write)(bytes(path), layout, attributes, samples.into()) })
     }
 

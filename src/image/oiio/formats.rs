@@ -1,8 +1,9 @@
 //! Which formats are read, and how that of a file is told.
 //!
-//! Given a path alone, OpenImageIO has its readers try the file one after the other, whatever the suffix says, and some of them write past their
-//! memory where a file is damaged (IFF, ICO and Maya's Z among them). So the first bytes decide here, and no reader but one that is listed gets to see the
-//! file. To run the others in a process of their own would cost one for each picture, for formats that nobody keeps light in.
+//! Given a path alone, OpenImageIO has its readers try the file one after the other, whatever the suffix says, and some
+//! of them write past their memory where a file is damaged (IFF, ICO and Maya's Z among them). So the first bytes
+//! decide here, and no reader but one that is listed gets to see the file. To run the others in a process of their own
+//! would cost one for each picture, for formats that nobody keeps light in.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -15,8 +16,8 @@ use crate::output::suffix;
 /// What a file begins with, after so many other bytes.
 type Mark = (usize, &'static [u8]);
 
-/// The formats that are read, OpenImageIO's names of them, and how their files begin. Those of the formats that are not (BMP, DDS, DPX, GIF, JPEG 2000, SGI, Targa ...)
-/// have written or read past their memory in versions that Debian has.
+/// The formats that are read, OpenImageIO's names of them, and how their files begin. Those of the formats that are not
+/// (BMP, DDS, DPX, GIF, JPEG 2000, SGI, Targa ...) have written or read past their memory in versions that Debian has.
 const READ: [(Format, &str, &[Mark]); 7] = [
     (Format::OpenExr, "openexr", &[(0, b"\x76\x2f\x31\x01")]),
     (Format::Radiance, "hdr", &[(0, b"#?")]),

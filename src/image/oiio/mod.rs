@@ -175,7 +175,8 @@ pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Resul
     }
 }
 
-/// Of a JPEG file the picture alone: what OpenImageIO makes of the words that cameras and programs leave beside it reads past their end where they are damaged.
+/// Of a JPEG file the picture alone: what OpenImageIO makes of the words that cameras and programs leave beside it
+/// reads past their end where they are damaged.
 fn read_jpeg(path: &Path, name: &str, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
     let file = Mapped::open(path).map_err(|error| error.to_string())?;
     let Plain { bytes, orientation } = jpeg::plain(&file).ok_or("a broken JPEG file: there is no picture in it")?;
@@ -234,7 +235,8 @@ fn open_exr(path: &Path) -> Result<Input<'static>> {
     }
 }
 
-/// Where a file's pixels lie in the picture that it holds a part of. None where it holds the whole, as every file that is not OpenEXR.
+/// Where a file's pixels lie in the picture that it holds a part of. None where it holds the whole, as every file that
+/// is not OpenEXR.
 pub(super) fn placed(path: &Path) -> Result<Option<Placed>> {
     if formats::of(path)?.0 != Format::OpenExr {
         return Ok(None);

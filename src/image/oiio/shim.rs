@@ -1,11 +1,12 @@
 //! The shim over OpenImageIO (`ffi/oiio`), a shared library that the program carries inside, and how it is opened.
 //!
-//! Debian's OpenImageIO brings 260 libraries, which take a quarter of a second and 130 MB: linked with the program, they would cost that at every
-//! start. The shim alone is linked with it, and opened when the first image file is. It stands in the
-//! program so that this stays one file, wherever it is copied to; the loader gets it as a file in memory, or as a temporary one.
+//! Debian's OpenImageIO brings 260 libraries, which take a quarter of a second and 130 MB: linked with the program,
+//! they would cost that at every start. The shim alone is linked with it, and opened when the first image file is. It
+//! stands in the program so that this stays one file, wherever it is copied to; the loader gets it as a file in memory,
+//! or as a temporary one.
 //!
-//! The simpler way, to look up OpenImageIO's functions by their names as `image/denoise` does for its library, needs a C interface, and this one has
-//! classes with virtual functions, templates and data.
+//! The simpler way, to look up OpenImageIO's functions by their names as `image/denoise` does for its library, needs a
+//! C interface, and this one has classes with virtual functions, templates and data.
 #![allow(unsafe_code, reason = "opening a shared library, and saying of which type its function is")]
 
 use std::fs;
@@ -94,8 +95,9 @@ fn private_folder(parent: &Path) -> io::Result<PathBuf> {
 
 /// Opens the shim at this path.
 fn load(path: &Path) -> Result<&'static Functions, String> {
-    // SAFETY: the file has just been written here, from what the program carries, where nobody else writes. What OpenImageIO does when it is loaded is up to
-    // whoever installed it, as with every library that a program is linked with.
+    // SAFETY: the file has just been written here, from what the program carries, where nobody else writes. What
+    // OpenImageIO does when it is loaded is up to whoever installed it, as with every library that a program is linked
+    // with.
     let library = ManuallyDrop::new(unsafe { loading::open(path, RTLD_LAZY) }?);
     // SAFETY: the shim defines the function so in `ffi/oiio/shim.h`, and is never closed.
     let table: extern "C" fn() -> &'static Functions = unsafe { loading::function(&library, &["twincast_oiio"]) }?;

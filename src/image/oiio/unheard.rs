@@ -1,7 +1,8 @@
 //! Formats whose writers do not tell what goes wrong.
 //!
-//! OpenImageIO's writers of these take no notice of a disk that is full, nor of sizes that a format does not hold, and say that the file is
-//! written. So they write to memory, where there is room; what they wrote is read again, and copied to its place by ourselves.
+//! OpenImageIO's writers of these take no notice of a disk that is full, nor of sizes that a format does not hold, and
+//! say that the file is written. So they write to memory, where there is room; what they wrote is read again, and
+//! copied to its place by ourselves.
 
 use std::fs::{self, File};
 use std::io;

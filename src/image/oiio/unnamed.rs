@@ -7,8 +7,8 @@ use std::io;
 use std::os::fd::{AsRawFd, FromRawFd};
 use std::path::PathBuf;
 
-/// A new one, which is gone once it is closed, and a path under which this process can open it meanwhile. `name` is shown to those who look at the
-/// process alone.
+/// A new one, which is gone once it is closed, and a path under which this process can open it meanwhile. `name` is
+/// shown to those who look at the process alone.
 pub(super) fn create(name: &CStr) -> io::Result<(File, PathBuf)> {
     // SAFETY: the name is a string that ends in 0.
     let descriptor = unsafe { libc::memfd_create(name.as_ptr(), libc::MFD_CLOEXEC) };

@@ -34,7 +34,8 @@ impl Component {
         }
     }
 
-    /// What is stored as the number `stored` stands for: where it is normalised, whole numbers stand for shares of the largest.
+    /// What is stored as the number `stored` stands for: where it is normalised, whole numbers stand for shares of the
+    /// largest.
     pub(super) fn value(self, stored: f32, normalized: bool) -> f32 {
         let largest = match self {
             Self::I8 => 127.0,

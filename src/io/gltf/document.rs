@@ -77,8 +77,8 @@ impl<'a> Document<'a> {
             zeros: RefCell::default(),
             zero_bytes: Cell::new(0),
             taken: Cell::new(0),
-            // Decoding makes data a few times larger, sharing between primitives a few times more; a file far beyond that
-            // is made to exhaust memory.
+            // Decoding makes data a few times larger, sharing between primitives a few times more; a file far beyond
+            // that is made to exhaust memory.
             most: (1 << 28) + 64 * file.len() as u64,
         };
         for index in 0..document.root.buffers.len() {
@@ -142,7 +142,8 @@ impl<'a> Document<'a> {
         Ok(bytes)
     }
 
-    /// Whether a buffer stands in for readers that cannot decompress: it says so, or it has no bytes and all that lies in it is compressed.
+    /// Whether a buffer stands in for readers that cannot decompress: it says so, or it has no bytes and all that lies
+    /// in it is compressed.
     fn is_fallback(&self, index: usize) -> bool {
         let buffer = &self.root.buffers[index];
         let mut views = self.root.buffer_views.iter().filter(|view| view.buffer == index).peekable();
@@ -201,7 +202,8 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Counts bytes that an accessor without data stands for, up to `most` of all of them: once, for whoever makes memory of them counts that besides.
+    /// Counts bytes that an accessor without data stands for, up to `most` of all of them: once, for whoever makes
+    /// memory of them counts that besides.
     pub(super) fn spend_zeros(&self, accessor: usize, bytes: u64, most: u64) -> Placeless<()> {
         if self.zeros.borrow_mut().insert(accessor) {
             self.zero_bytes.set(self.zero_bytes.get().saturating_add(bytes));

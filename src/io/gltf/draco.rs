@@ -1,7 +1,7 @@
 //! `KHR_draco_mesh_compression`: the triangles and attributes of a primitive, compressed together.
 //!
-//! The bitstream is read by the crate draco-core, which is Rust without `unsafe`, gives what Google's own library gives, and refuses what
-//! would take more memory than it is told there is.
+//! The bitstream is read by the crate draco-core, which is Rust without `unsafe`, gives what Google's own library
+//! gives, and refuses what would take more memory than it is told there is.
 
 use std::collections::BTreeMap;
 

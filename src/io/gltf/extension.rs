@@ -1,8 +1,8 @@
-//! What extensions say about a material: `KHR_materials_unlit`, `_emissive_strength`, `_ior`, `_specular`, `_transmission`, `_volume` and
-//! `_pbrSpecularGlossiness`.
+//! What extensions say about a material: `KHR_materials_unlit`, `_emissive_strength`, `_ior`, `_specular`,
+//! `_transmission`, `_volume` and `_pbrSpecularGlossiness`.
 //!
-//! The thickness of a volume only says whether there is one: how far light has to go through it rays find out, so its texture is not
-//! read.
+//! The thickness of a volume only says whether there is one: how far light has to go through it rays find out, so its
+//! texture is not read.
 
 use serde::Deserialize;
 use serde_json::Value;

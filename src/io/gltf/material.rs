@@ -1,7 +1,7 @@
 //! Materials.
 //!
-//! What becomes of the numbers is [`Physical`]'s. A material has Phong's values for the mean of its textures; where more than its colour
-//! varies, it keeps what they follow from as well, so that they are found again at each hit.
+//! What becomes of the numbers is [`Physical`]'s. A material has Phong's values for the mean of its textures; where
+//! more than its colour varies, it keeps what they follow from as well, so that they are found again at each hit.
 //!
 //! Occlusion textures are not read: what they hold, how much of its surroundings a point sees, rays find out.
 
@@ -40,7 +40,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// The material with the means of its textures; of the colour's, for all but the diffuse colour, which it multiplies.
+    /// The material with the means of its textures; of the colour's, for all but the diffuse colour, which it
+    /// multiplies.
     fn phong(&self) -> Material {
         let diffuse = self.physical.phong(&self.means).diffuse;
         Material {
@@ -60,7 +61,8 @@ impl<'a> Materials<'a> {
         Self { document, known: HashMap::new(), list: Vec::new(), textures: Textures::new(document) }
     }
 
-    /// The scene's index of a material where vertices have colours or not, and which sets of texture coordinates it needs; `pointer` says who asks.
+    /// The scene's index of a material where vertices have colours or not, and which sets of texture coordinates it
+    /// needs; `pointer` says who asks.
     pub(super) fn get(&mut self, index: Option<usize>, is_colored: bool, pointer: &str) -> Result<(u32, Sets)> {
         let document = self.document;
         let materials = &document.root.materials;

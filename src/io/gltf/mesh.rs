@@ -1,5 +1,5 @@
-//! Meshes: each becomes a group, each of its primitives that has area a geometry; of those that are deformed, one group for each shape
-//! that they take.
+//! Meshes: each becomes a group, each of its primitives that has area a geometry; of those that are deformed, one group
+//! for each shape that they take.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -202,7 +202,8 @@ impl<'a> Groups<'a> {
         let colors = match colors {
             Some(view) => {
                 let alpha = if view.components() == 4 { Vec4::ZERO } else { Vec4::W };
-                // With what displaces them they may leave the range of colours, which the specification cuts either way.
+                // With what displaces them they may leave the range of colours, which the specification cuts either
+                // way.
                 let accessor =
                     primitive.attributes.get("COLOR_0").and_then(|&index| document.root.accessors.get(index));
                 let is_unmarked = accessor.is_some_and(|own| {

@@ -5,8 +5,8 @@
 //! unused is refused. A mesh becomes a group, each primitive with area a geometry of it, each node with a mesh an
 //! instance. A mesh that is deformed, by a skin or morph targets, becomes a group for each of its shapes.
 //!
-//! [`pose`] says where nodes are, at a time of an animation or as the file stores them. What moves as a whole moves while the shutter
-//! is open too; what is deformed has the shape of the moment when it opens.
+//! [`pose`] says where nodes are, at a time of an animation or as the file stores them. What moves as a whole moves
+//! while the shutter is open too; what is deformed has the shape of the moment when it opens.
 //!
 //! Not rendered, and told in warnings: points and lines.
 

@@ -59,7 +59,8 @@ pub(super) fn place(
     Ok(())
 }
 
-/// Leaves out groups that nothing places: of which only copies that are pressed flat stand in the scene, or not even those.
+/// Leaves out groups that nothing places: of which only copies that are pressed flat stand in the scene, or not even
+/// those.
 fn drop_unplaced(scene: &mut Scene) {
     let mut is_placed = vec![false; scene.groups.len()];
     scene.instances.iter().for_each(|instance| is_placed[instance.group as usize] = true);
@@ -140,8 +141,8 @@ impl Stage<'_, '_> {
         Ok(())
     }
 
-    /// A copy of a group where `transform` presses it flat, by a scale of zero along one axis: rays cannot be taken back through
-    /// that. None where nothing is left that has an area.
+    /// A copy of a group where `transform` presses it flat, by a scale of zero along one axis: rays cannot be taken
+    /// back through that. None where nothing is left that has an area.
     fn pressed(&mut self, group: u32, transform: &DAffine3, pointer: &str) -> Result<Option<u32>> {
         let Scene { geometries, groups, .. } = &mut *self.scene;
         let begin = geometries.len() as u32;

@@ -5,7 +5,8 @@ const MAX_QUOTED: usize = 60;
 /// Most characters of a message.
 const MAX: usize = 600;
 
-/// A message in which what stands between quotes (`"` as Rust and serde write texts, `` ` `` as serde writes names) is cut short.
+/// A message in which what stands between quotes (`"` as Rust and serde write texts, `` ` `` as serde writes names) is
+/// cut short.
 pub(super) fn shortened(message: &str) -> String {
     let mut short = String::new();
     let mut rest = message;

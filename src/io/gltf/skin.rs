@@ -85,7 +85,8 @@ impl<'v> Skin<'v> {
         Ok(skin)
     }
 
-    /// What a vertex of the primitive is moved by: the mean of its joints, by their weights. Those that weigh nothing follow the first.
+    /// What a vertex of the primitive is moved by: the mean of its joints, by their weights. Those that weigh nothing
+    /// follow the first.
     pub(super) fn at(&self, vertex: usize) -> DAffine3 {
         let mut sum = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
         let mut total = 0.0;
@@ -103,7 +104,8 @@ impl<'v> Skin<'v> {
         *self.matrices.get(first as usize).unwrap_or(&self.matrices[0])
     }
 
-    /// The joints of a vertex that weigh anything, each with its weight: some exporters leave any number where the weight is 0.
+    /// The joints of a vertex that weigh anything, each with its weight: some exporters leave any number where the
+    /// weight is 0.
     fn heeded(&self, vertex: usize) -> impl Iterator<Item = (f32, f32)> {
         let joints = self.sets.iter().flat_map(move |[joints, _]| joints.floats::<4>(vertex));
         let weights = self.sets.iter().flat_map(move |[_, weights]| weights.floats::<4>(vertex));

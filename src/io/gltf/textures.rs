@@ -1,7 +1,7 @@
 //! Textures, and the pictures they show.
 //!
-//! A picture is decoded once, when a material first needs it, and shared by all images that are it, and by all textures that show it: one for each sampler,
-//! place (`KHR_texture_transform`) and set of coordinates.
+//! A picture is decoded once, when a material first needs it, and shared by all images that are it, and by all textures
+//! that show it: one for each sampler, place (`KHR_texture_transform`) and set of coordinates.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -93,8 +93,8 @@ impl Transform {
         if are_finite { Ok(transform) } else { Err("KHR_texture_transform: the numbers have to be finite".into()) }
     }
 
-    /// From coordinates to coordinates, both with v up. glTF's v points down, and its angle turns what is then seen counter-clockwise:
-    /// that is the usual turn with v up.
+    /// From coordinates to coordinates, both with v up. glTF's v points down, and its angle turns what is then seen
+    /// counter-clockwise: that is the usual turn with v up.
     fn matrix(&self) -> Affine2 {
         let flip = Affine2::from_scale_angle_translation(Vec2::new(1.0, -1.0), 0.0, Vec2::Y);
         let (sin, cos) = libm::sincosf(self.rotation);
@@ -121,8 +121,8 @@ impl<'a> Textures<'a> {
         self.list
     }
 
-    /// The scene's index of what a material's slot at `pointer` names, whose coordinates are one of `sets`. None, and a warning,
-    /// where its file is missing, or it wants a third set of coordinates.
+    /// The scene's index of what a material's slot at `pointer` names, whose coordinates are one of `sets`. None, and a
+    /// warning, where its file is missing, or it wants a third set of coordinates.
     pub(super) fn get(&mut self, info: Option<&TextureInfo>, sets: &mut Sets, pointer: &str) -> Result<Option<u32>> {
         let Some(info) = info else { return Ok(None) };
         let document = self.document;

@@ -4,9 +4,9 @@
 //! A statement takes a line; corners of polygons, ends of cones and parts of the view have a line each. Colours are
 //! linear. Decided where the description leaves it open: the fill colour times Kd is the diffuse part; Ks is a white
 //! Phong highlight and the share of the mirrored ray; T is the share of the refracted ray; lights do not weaken with
-//! distance, and there is no ambient light, so a file without lights is dark. The camera has no near plane, so `hither` is
-//! read and not used. All faces have two sides, so a negative radius, inside out, changes nothing but what a ray through
-//! glass takes for outside: there it is told in a warning.
+//! distance, and there is no ambient light, so a file without lights is dark. The camera has no near plane, so `hither`
+//! is read and not used. All faces have two sides, so a negative radius, inside out, changes nothing but what a ray
+//! through glass takes for outside: there it is told in a warning.
 //!
 //! Triangles become meshes. Polygons stay polygons, concave or not; what is no polygon of one plane is divided into
 //! triangles, and told.

@@ -1,7 +1,7 @@
 //! The view of an NFF file: six lines that make a camera.
 //!
-//! `angle` spans from the centre of the first row to that of the last. N rows are N / (N - 1) of that, by the tangents of
-//! the half angles.
+//! `angle` spans from the centre of the first row to that of the last. N rows are N / (N - 1) of that, by the tangents
+//! of the half angles.
 
 use super::super::Placeless;
 use super::super::statement::Statement;

@@ -73,7 +73,8 @@ pub(super) fn scene(path: &Path, mut obj: Obj, library: Library, warnings: &mut 
     Ok(scene)
 }
 
-/// Around what rays can hit: neither vertices that no face uses have a say, nor faces with a corner that cannot be traced.
+/// Around what rays can hit: neither vertices that no face uses have a say, nor faces with a corner that cannot be
+/// traced.
 fn bounds(obj: &Obj, triangles: &[Triangles]) -> DAabb {
     let place = |i: u32| obj.positions.get(i as usize).copied();
     if obj.positions.par_iter().with_min_len(TASK).all(is_traceable_f64) {

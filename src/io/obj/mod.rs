@@ -2,9 +2,9 @@
 //!
 //! Reading takes four steps, of which all but the third run in parallel over stretches of whole lines: statements are
 //! counted, so that each stretch knows its first line and what relative indices count from ([`stretch`]); they are read
-//! into lists ([`statement`]); materials, smoothing groups and names, which hold until they are changed, are carried from
-//! stretch to stretch ([`Obj::new`]); lists become meshes ([`build`]), one for each material of an object. Faces may name vertices that
-//! come after them, so their indices are compared with the counts at the end.
+//! into lists ([`statement`]); materials, smoothing groups and names, which hold until they are changed, are carried
+//! from stretch to stretch ([`Obj::new`]); lists become meshes ([`build`]), one for each material of an object. Faces
+//! may name vertices that come after them, so their indices are compared with the counts at the end.
 //!
 //! Read: v (with colours, sRGB-encoded as Blender and MeshLab write them), vt, vn, f, o, g, s, usemtl, mtllib. Points
 //! and lines have no area and are counted in a warning; curves and surfaces are named in one.

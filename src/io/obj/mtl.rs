@@ -1,7 +1,7 @@
 //! MTL, the materials of an OBJ file (Wavefront 1995).
 //!
-//! Kd, Ks, Ke and Ka are taken as linear. A highlight is Blinn-Phong's; `illum 0` and `illum 1` have none. What is not read
-//! (transparency, mirrors, the other maps) is named in a warning.
+//! Kd, Ks, Ke and Ka are taken as linear. A highlight is Blinn-Phong's; `illum 0` and `illum 1` have none. What is not
+//! read (transparency, mirrors, the other maps) is named in a warning.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,8 @@ pub(super) struct Library {
 
 /// The largest exponent that is usual.
 const SHARPEST: f32 = 1000.0;
-/// Up to this exponent a highlight would cover all that the light does: `Ns 0` of MeshLab and `Ns 1` of trimesh stand beside a `Ks` that nobody is meant to see.
+/// Up to this exponent a highlight would cover all that the light does: `Ns 0` of MeshLab and `Ns 1` of trimesh stand
+/// beside a `Ks` that nobody is meant to see.
 const BLUNTEST: f32 = 1.0;
 
 #[derive(Default)]
@@ -68,7 +69,8 @@ impl Library {
         if names.trim().is_empty() {
             return Ok(());
         }
-        // A name may contain spaces and more; the format also lets several names stand in a line, and comments behind them.
+        // A name may contain spaces and more; the format also lets several names stand in a line, and comments behind
+        // them.
         let one = |names: &str| vec![texture::beside(obj, names)];
         let each = |names: &str| names.split_whitespace().map(|name| texture::beside(obj, name)).collect::<Vec<_>>();
         let are_there = |files: &[PathBuf]| files.iter().all(|file| file.is_file());
@@ -132,8 +134,8 @@ impl Library {
         }
     }
 
-    /// Hands `scene` the named materials, in that order, and their textures. `colored`: where the vertices have colours of their own,
-    /// a material that the library does not have is white.
+    /// Hands `scene` the named materials, in that order, and their textures. `colored`: where the vertices have colours
+    /// of their own, a material that the library does not have is white.
     pub(super) fn resolve(
         self,
         obj: &Path,
@@ -231,7 +233,8 @@ impl Entry {
 
     /// The exponent of the highlight; none where there is no highlight.
     fn shininess(&self) -> Option<f32> {
-        // The same width as a lobe of GGX of that roughness (Walter et al. 2007, *Microfacet models for refraction through rough surfaces*).
+        // The same width as a lobe of GGX of that roughness (Walter et al. 2007, *Microfacet models for refraction
+        // through rough surfaces*).
         let of_roughness = |roughness: f32| (2.0 / roughness.powi(4) - 2.0).min(SHARPEST);
         let exponent = self.shininess.or(self.roughness.map(of_roughness))?;
         (exponent > BLUNTEST).then_some(exponent)
@@ -364,8 +367,8 @@ fn next_is(words: &Words<'_>, word: &[u8]) -> bool {
     Words::new(words.rest(), words.line).next() == Some(word)
 }
 
-/// One number for a grey, or three: r, g and b, or `xyz` and CIE 1931's X, Y and Z. What those name beyond the colours of a display is
-/// its nearest one.
+/// One number for a grey, or three: r, g and b, or `xyz` and CIE 1931's X, Y and Z. What those name beyond the colours
+/// of a display is its nearest one.
 fn color(keyword: &[u8], words: &mut Words<'_>) -> Placeless<Vec3> {
     let is_xyz = next_is(words, b"xyz");
     let names = if is_xyz { "x y z" } else { "r g b" };

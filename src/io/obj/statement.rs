@@ -284,7 +284,8 @@ fn corner(word: &[u8], counts: [usize; 3]) -> Placeless<[u32; 3]> {
     Ok(corner)
 }
 
-/// The corner that a text begins with, and its length in bytes, where its indices are a few plain digits from 1 up, as nearly all are.
+/// The corner that a text begins with, and its length in bytes, where its indices are a few plain digits from 1 up, as
+/// nearly all are.
 #[inline]
 fn plain_corner(text: &[u8]) -> Option<([u32; 3], usize)> {
     let index = |from: usize| match whole(&text[from..], 0) {

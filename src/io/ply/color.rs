@@ -27,7 +27,8 @@ impl Color {
         self.rgb.iter().chain(&self.alpha).all(|(_, scalar)| *scalar == Scalar::U8)
     }
 
-    /// All channels in one word, of a colour of bytes; by a function that gives the values of properties by their index.
+    /// All channels in one word, of a colour of bytes; by a function that gives the values of properties by their
+    /// index.
     #[inline]
     pub(super) fn packed(&self, value: impl Fn(usize) -> f64) -> u32 {
         let [r, g, b] = self.rgb.map(|(index, _)| value(index) as u8);

@@ -65,7 +65,8 @@ impl Faces {
         Ok(())
     }
 
-    /// Reads the triangles at the beginning that are records of one size, behind those of strips that came first, and gives their number.
+    /// Reads the triangles at the beginning that are records of one size, behind those of strips that came first, and
+    /// gives their number.
     fn read_at_once(&mut self, element: &Element, items: &mut impl Items, positions: &Positions) -> usize {
         let at_once = items.triangles(element, positions.len());
         let read = at_once.len();

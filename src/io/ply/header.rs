@@ -141,8 +141,8 @@ pub(super) fn parse(path: &Path, file: &[u8]) -> Result<Header> {
     let mut elements: Vec<Element> = Vec::new();
     let mut textures = Vec::new();
     let mut last = 1;
-    // Lines without joining: a comment may end in a backslash. All end as the first one does: behind a `\r` alone, with which the format's author
-    // has them end, a binary body may begin with `\n`.
+    // Lines without joining: a comment may end in a backslash. All end as the first one does: behind a `\r` alone, with
+    // which the format's author has them end, a binary body may begin with `\n`.
     let end = if bytes.starts_with(b"ply\r") && !bytes.starts_with(b"ply\r\n") { b'\r' } else { b'\n' };
     let mut length = file.len() - bytes.len();
     for (index, raw) in bytes.split_inclusive(|&b| b == end).enumerate() {

@@ -2,11 +2,11 @@
 //!
 //! The header says what the file holds ([`header`]); the rest is read element by element. Binary values are read where
 //! they lie in the mapped file ([`binary`]), text word by word ([`ascii`]); both hand the same [`Items`] to what builds
-//! the mesh ([`vertices`], [`faces`]), or several where faces have different textures ([`wedges`], [`textures`]). Elements
-//! and properties that a mesh has no use for are skipped by their declared sizes.
+//! the mesh ([`vertices`], [`faces`]), or several where faces have different textures ([`wedges`], [`textures`]).
+//! Elements and properties that a mesh has no use for are skipped by their declared sizes.
 //!
-//! What nearly every large file is made of, binary records of one size, is read in parallel; whatever differs is left to
-//! the general code, item by item.
+//! What nearly every large file is made of, binary records of one size, is read in parallel; whatever differs is left
+//! to the general code, item by item.
 
 mod ascii;
 mod binary;
@@ -75,8 +75,8 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     textures::scene(path, &header, parts, warnings)
 }
 
-/// What the header says of vertices and faces, if the file may hold as many. A face is a triangle at least; of how many in a binary file its length tells,
-/// where nothing but the faces' corners is of an unknown size.
+/// What the header says of vertices and faces, if the file may hold as many. A face is a triangle at least; of how many
+/// in a binary file its length tells, where nothing but the faces' corners is of an unknown size.
 pub(super) fn promised(path: &Path, file: &Mapped<'_>) -> Option<Promised> {
     let header = header::parse(path, file).ok()?;
     let count = |name: &str| header.element(name).map_or(0, |element| element.count);
@@ -91,8 +91,8 @@ pub(super) fn promised(path: &Path, file: &Mapped<'_>) -> Option<Promised> {
     Some(Promised { triangles, bytes: (vertices + triangles) * size_of::<[u32; 3]>() as u64 })
 }
 
-/// Corners of all faces of a binary file of so many bytes: what is left when all else is taken away; none if that is not known. What follows the last element,
-/// with a warning later, counts as well.
+/// Corners of all faces of a binary file of so many bytes: what is left when all else is taken away; none if that is
+/// not known. What follows the last element, with a warning later, counts as well.
 fn corners(header: &Header, bytes: u64) -> Option<u64> {
     let faces = header.element("face").filter(|_| header.encoding != Encoding::Ascii)?;
     let lists = |element: &Element| element.properties.iter().filter(|property| property.list.is_some()).count();

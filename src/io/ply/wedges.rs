@@ -101,7 +101,8 @@ impl Wedges {
         Some(triangles)
     }
 
-    /// Puts vertices in place of the positions of a face's corners, and notes the texture of the triangles that it is made of.
+    /// Puts vertices in place of the positions of a face's corners, and notes the texture of the triangles that it is
+    /// made of.
     pub(super) fn face(&mut self, face: &Item, corners: &mut [u32], triangles: usize) -> Placeless<()> {
         self.corners += corners.len() as u64;
         if self.corners >= MAX_CORNERS {

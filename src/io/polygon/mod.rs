@@ -1,9 +1,10 @@
 //! Triangles from polygons of any number of corners, concave ones too.
 //!
-//! Ear clipping (Meisters 1975, *Polygons have ears*) in the plane that fits best, whose normal is Newell's (Sutherland,
-//! Sproull, Schumacker 1974). A fan from the first corner would be right for convex polygons alone, and is what those
-//! get. Whether a corner is in the way of an ear is asked of a tree ([`Reflex`]), so that a million corners take a
-//! second. A sweep (O(n log n)) would have a bound for outlines that cross themselves, too, and be a page of cases for the corners on which it fails.
+//! Ear clipping (Meisters 1975, *Polygons have ears*) in the plane that fits best, whose normal is Newell's
+//! (Sutherland, Sproull, Schumacker 1974). A fan from the first corner would be right for convex polygons alone, and is
+//! what those get. Whether a corner is in the way of an ear is asked of a tree ([`Reflex`]), so that a million corners
+//! take a second. A sweep (O(n log n)) would have a bound for outlines that cross themselves, too, and be a page of
+//! cases for the corners on which it fails.
 
 mod reflex;
 mod spikes;
@@ -15,18 +16,19 @@ use self::reflex::Reflex;
 use super::Placeless;
 use crate::math::{DVec2, DVec3};
 
-/// Most corners and boxes of corners that are looked at for one polygon of so many corners: some seconds, and for a million corners some more. A hundred for
-/// each corner are enough for outlines that do not cross themselves.
+/// Most corners and boxes of corners that are looked at for one polygon of so many corners: some seconds, and for a
+/// million corners some more. A hundred for each corner are enough for outlines that do not cross themselves.
 const fn most_looks(count: usize) -> usize {
     200_000_000 + 1000 * count
 }
 
 /// Splits the polygon with the given corners into `corners.len() - 2` triangles of indices into `corners`, appended to
-/// `triangles`. Polygons that cross themselves, have no area or have corners that are not finite get triangles too. Where
-/// an outline goes somewhere and straight back, triangles without area stand for the way.
+/// `triangles`. Polygons that cross themselves, have no area or have corners that are not finite get triangles too.
+/// Where an outline goes somewhere and straight back, triangles without area stand for the way.
 ///
 /// # Errors
-/// A message where the polygon is so large, and crosses itself so often, that it would take too long; nothing is appended then.
+/// A message where the polygon is so large, and crosses itself so often, that it would take too long; nothing is
+/// appended then.
 pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> Placeless<()> {
     let count = corners.len();
     let split = if spikes::are_there(corners) {
@@ -61,8 +63,8 @@ fn triangulate_within(most: usize, corners: &[DVec3], triangles: &mut Vec<[u32; 
     // The corners that are left, each with its neighbours.
     let mut next: Vec<usize> = (1..=count).map(|i| i % count).collect();
     let mut before: Vec<usize> = (0..count).map(previous).collect();
-    // Whether a corner is an ear's tip changes with its neighbours only, so each waits to be looked at when they have changed; with how often it was put
-    // there, for the last time counts.
+    // Whether a corner is an ear's tip changes with its neighbours only, so each waits to be looked at when they have
+    // changed; with how often it was put there, for the last time counts.
     let mut waiting: VecDeque<(usize, usize)> = (0..count).map(|i| (i, 0)).collect();
     let mut turns = vec![0; count];
     let (mut left, mut has_clipped, mut somewhere) = (count, false, 0);
@@ -95,7 +97,8 @@ fn triangulate_within(most: usize, corners: &[DVec3], triangles: &mut Vec<[u32; 
         (next[a], before[c]) = (c, a);
         (left, has_clipped, somewhere, turns[b]) = (left - 1, true, c, usize::MAX);
         reflex.remove(b);
-        // Last, behind the others: slices instead of a fan of slivers. They may have become convex; they never become reflex.
+        // Last, behind the others: slices instead of a fan of slivers. They may have become convex; they never become
+        // reflex.
         for k in [a, c] {
             if cross(projected[before[k]], projected[k], projected[next[k]]) >= 0.0 {
                 reflex.remove(k);
@@ -195,7 +198,8 @@ mod tests {
         );
     }
 
-    /// A way out of a square or into it and back, at a corner, within a side, of several edges, and across the end of the list.
+    /// A way out of a square or into it and back, at a corner, within a side, of several edges, and across the end of
+    /// the list.
     #[test]
     fn ways_there_and_back_have_no_area() {
         let square = [[0., 0.], [1., 0.], [1., 1.], [0., 1.]];
@@ -269,7 +273,8 @@ mod tests {
         }
     }
 
-    /// Bands along a spiral of some turns: half of all corners are reflex, and most corners are no ear's tip for a long time.
+    /// Bands along a spiral of some turns: half of all corners are reflex, and most corners are no ear's tip for a long
+    /// time.
     #[test]
     fn ribbons_of_any_length() {
         for (corners, turns) in [(400, 1.0), (3000, 0.99), (3000, 5.0), (12_000, 20.0), (200_000, 50.0)] {

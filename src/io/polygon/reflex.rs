@@ -54,8 +54,9 @@ impl<'a> Reflex<'a> {
         }
     }
 
-    /// Whether one is in the triangle or on its edges. Rounding may put a corner that is far along an edge on the inner side of all three: outside the triangle's box
-    /// none counts. Corners that coincide with one of its own do not count: they are bridges to holes.
+    /// Whether one is in the triangle or on its edges. Rounding may put a corner that is far along an edge on the inner
+    /// side of all three: outside the triangle's box none counts. Corners that coincide with one of its own do not
+    /// count: they are bridges to holes.
     pub fn any_in(&mut self, triangle: [DVec2; 3]) -> bool {
         self.any_below(0, 0..self.order.len(), triangle)
     }
@@ -84,8 +85,9 @@ fn is_in([a, b, c]: [DVec2; 3], p: DVec2) -> bool {
 }
 
 impl Node {
-    /// Whether a point of the box may be in the triangle: in its box, and on the inner side of all edges. What is computed of a point for an edge grows with each
-    /// of its coordinates or falls with it, rounded or not, so that no point of the box has more than the corner that is taken here.
+    /// Whether a point of the box may be in the triangle: in its box, and on the inner side of all edges. What is
+    /// computed of a point for an edge grows with each of its coordinates or falls with it, rounded or not, so that no
+    /// point of the box has more than the corner that is taken here.
     fn may_reach(&self, [a, b, c]: [DVec2; 3]) -> bool {
         let (min, max) = (a.min(b).min(c), a.max(b).max(c));
         let is_near = self.min.cmple(max).all() && min.cmple(self.max).all();

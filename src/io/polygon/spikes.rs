@@ -1,7 +1,8 @@
-//! Edges of a polygon that are gone along and straight back: they bound no area, and a polygon clipped with them gets some.
+//! Edges of a polygon that are gone along and straight back: they bound no area, and a polygon clipped with them gets
+//! some.
 //!
-//! A way back has to come by the same corners. One that is divided otherwise, and a tip that stands twice, is left to the
-//! clipping.
+//! A way back has to come by the same corners. One that is divided otherwise, and a tip that stands twice, is left to
+//! the clipping.
 
 use crate::math::DVec3;
 

@@ -28,12 +28,13 @@ type Writer = fn(&Scene, &mut dyn Write) -> io::Result<()>;
 
 /// Writes `scene` to `path`. The suffix, in any case, decides the format: one of [`SAVE_SUFFIXES`].
 ///
-/// PLY holds one mesh of everything, positions and triangles: materials, normals, texture coordinates, lights and cameras are left out, as are from NFF names, and what
-/// of [`Scene::request`] is not the size.
+/// PLY holds one mesh of everything, positions and triangles: materials, normals, texture coordinates, lights and
+/// cameras are left out, as are from NFF names, and what of [`Scene::request`] is not the size.
 ///
 /// # Errors
-/// [`Error::Scene`] for what [`Scene::check`] refuses; [`Error::Usage`] for another suffix, and for what the format cannot say (spheres in PLY, corners that are
-/// NaN in text); [`Error::Output`] where the file cannot be written, which leaves an old one whole.
+/// [`Error::Scene`] for what [`Scene::check`] refuses; [`Error::Usage`] for another suffix, and for what the format
+/// cannot say (spheres in PLY, corners that are NaN in text); [`Error::Output`] where the file cannot be written, which
+/// leaves an old one whole.
 pub fn save(scene: &Scene, path: &Path) -> Result<()> {
     save_until(scene, path, &AtomicBool::new(false))
 }
@@ -124,7 +125,8 @@ fn placed(scene: &Scene) -> impl Iterator<Item = (&Geometry, &DAffine3)> {
     })
 }
 
-/// A triangle's corners in the order that has its front, once they are moved by `transform`, where it is before: a mirroring turns the winding.
+/// A triangle's corners in the order that has its front, once they are moved by `transform`, where it is before: a
+/// mirroring turns the winding.
 fn wound(corners: [u32; 3], transform: &DAffine3) -> [u32; 3] {
     let [a, b, c] = corners;
     if transform.matrix3.determinant() < 0.0 { [a, c, b] } else { corners }

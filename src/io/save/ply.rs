@@ -1,5 +1,5 @@
-//! Binary PLY, little-endian: one mesh of everything, in scene coordinates, which are doubles where f32 does not hold them. Polygons are divided into triangles;
-//! materials, normals, texture coordinates, lights and cameras are left out.
+//! Binary PLY, little-endian: one mesh of everything, in scene coordinates, which are doubles where f32 does not hold
+//! them. Polygons are divided into triangles; materials, normals, texture coordinates, lights and cameras are left out.
 
 use std::io::{self, Write};
 

@@ -1,5 +1,5 @@
-//! Twincast's own format, as docs/SCENES.md describes it. Groups that are placed more than once, or moved, are written as
-//! groups; the others at the top of the file.
+//! Twincast's own format, as docs/SCENES.md describes it. Groups that are placed more than once, or moved, are written
+//! as groups; the others at the top of the file.
 
 use std::collections::HashSet;
 use std::io::{self, Write};
@@ -13,7 +13,8 @@ use crate::scene::{
 };
 use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 
-/// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
+/// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in
+/// meshes.
 pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
     check_finite(scene)?;
     if scene.environment.is_some() {

@@ -1,10 +1,10 @@
-//! Twincast's own scene format: TOML (Preston-Werner and others, *TOML 1.1*), for whatever the renderer has. docs/SCENES.md
-//! describes every key.
+//! Twincast's own scene format: TOML (Preston-Werner and others, *TOML 1.1*), for whatever the renderer has.
+//! docs/SCENES.md describes every key.
 //!
 //! The document is parsed into a tree that knows its places ([`table`]). The top of the file and each group are bodies:
 //! [`primitives`], mesh files ([`include`]) and placements of groups, which are unrolled into one list of instances
-//! ([`group`]); where there are very many, they are read in [`pieces`]. What is seen of it all, and from where, is in [`look`]. A key that
-//! nobody reads is refused.
+//! ([`group`]); where there are very many, they are read in [`pieces`]. What is seen of it all, and from where, is in
+//! [`look`]. A key that nobody reads is refused.
 
 mod environment;
 mod fog;

@@ -1,12 +1,13 @@
 //! Placements and primitives, cut out of the text and read some thousands at a time.
 //!
-//! A tree of the whole file takes 3 kB for each `[[sphere]]` and 8 kB for each `[[instance]]`: a list of tokens, one of events, and a B-tree with room for
-//! eleven keys for each table. Those tables are what files have by the million, and none depends on
-//! another. So where there are many at the top of a file, they are taken out of the text; the rest is parsed as ever, and they are parsed in pieces,
-//! by all threads, of which only what they say is kept. A parser of our own, without a tree, would know TOML a second time.
+//! A tree of the whole file takes 3 kB for each `[[sphere]]` and 8 kB for each `[[instance]]`: a list of tokens, one of
+//! events, and a B-tree with room for eleven keys for each table. Those tables are what files have by the million, and
+//! none depends on another. So where there are many at the top of a file, they are taken out of the text; the rest is
+//! parsed as ever, and they are parsed in pieces, by all threads, of which only what they say is kept. A parser of our
+//! own, without a tree, would know TOML a second time.
 //!
-//! To find them it is enough to know where strings, comments and lists end. In a text that is no TOML something else may be cut;
-//! then a piece or the rest is no TOML either, and is refused for it.
+//! To find them it is enough to know where strings, comments and lists end. In a text that is no TOML something else
+//! may be cut; then a piece or the rest is no TOML either, and is refused for it.
 
 use std::ops::Range;
 
@@ -58,8 +59,8 @@ impl Cut {
     }
 }
 
-/// Each table of one of the keys' lists at the top, up to the next header that is not part of it. None where a header speaks of the last table of a list, and another
-/// list's came in between: that may be in another piece.
+/// Each table of one of the keys' lists at the top, up to the next header that is not part of it. None where a header
+/// speaks of the last table of a list, and another list's came in between: that may be in another piece.
 fn tables(text: &[u8], keys: &[&str]) -> Option<Vec<Range<usize>>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     let mut open: Option<(usize, &str)> = None;

@@ -103,8 +103,8 @@ pub(super) fn meshes(
     Ok(geometries)
 }
 
-/// The mesh with the parameters of each triangle as texture coordinates: the weights of the second and the third corner, as shapes have their
-/// own.
+/// The mesh with the parameters of each triangle as texture coordinates: the weights of the second and the third
+/// corner, as shapes have their own.
 pub(super) fn with_parameters(mesh: &Mesh) -> Mesh {
     let corners = mesh.triangles.as_flattened();
     let triangles = (0..mesh.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();

@@ -1,8 +1,8 @@
 //! Typed access to a TOML document that knows where everything stands.
 //!
-//! A table remembers which keys it was asked for, and [`Table::finish`] refuses all others: so the code that reads a table is
-//! its schema, and what it does not know it can suggest. Deserialising into structs, the alternative, loses the place of
-//! most mistakes, and what serde says about them names neither the remedy nor the nearest key.
+//! A table remembers which keys it was asked for, and [`Table::finish`] refuses all others: so the code that reads a
+//! table is its schema, and what it does not know it can suggest. Deserialising into structs, the alternative, loses
+//! the place of most mistakes, and what serde says about them names neither the remedy nor the nearest key.
 
 use std::ops::RangeInclusive;
 
@@ -61,8 +61,8 @@ impl<'t> Table<'t> {
         found.ok_or_else(|| self.misspelt(key).unwrap_or_else(lacks))
     }
 
-    /// That a key stands there which nobody has asked for so far, and which is `key` with a slip. Not as far from it as a [`suggestion`] may be: it may be asked for later, as
-    /// `apex_radius` after `base_radius`.
+    /// That a key stands there which nobody has asked for so far, and which is `key` with a slip. Not as far from it as
+    /// a [`suggestion`] may be: it may be asked for later, as `apex_radius` after `base_radius`.
     fn misspelt(&self, key: &str) -> Option<Fault> {
         let mut others = self.entries.keys().filter(|other| !self.asked.contains(&other.get_ref().as_ref()));
         others.find_map(|other| {
@@ -256,7 +256,8 @@ impl<'t> Value<'t> {
     }
 }
 
-/// A value as messages show it: what is a text and what is a number can be told apart, and of a list that is short what is in it is seen.
+/// A value as messages show it: what is a text and what is a number can be told apart, and of a list that is short what
+/// is in it is seen.
 fn shown(value: &DeValue<'_>) -> String {
     const SHORT: usize = 5;
     match value {

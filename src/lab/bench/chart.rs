@@ -1,9 +1,9 @@
 //! The rates as a picture: small multiples, one for each scene and kind of ray, of one bar for each engine and mode.
 //!
-//! A bar is the median at the best width, from zero; the line across its end goes from the smallest to the largest rate, rings are the
-//! medians of other widths. Every kind of ray has a scale of its own, since diffuse rays are ten times slower than camera rays: on a
-//! common one, the alternative, they could not be told apart. SVG is written as it is; a library that draws charts would
-//! weigh more than the program.
+//! A bar is the median at the best width, from zero; the line across its end goes from the smallest to the largest
+//! rate, rings are the medians of other widths. Every kind of ray has a scale of its own, since diffuse rays are ten
+//! times slower than camera rays: on a common one, the alternative, they could not be told apart. SVG is written as it
+//! is; a library that draws charts would weigh more than the program.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -183,7 +183,8 @@ fn ratios(ratio: &Ratio) -> String {
     if known.is_empty() { String::new() } else { format!("native over Embree {}", known.join(", ")) }
 }
 
-/// The step between ticks, and how many it takes to reach `most`: steps of 1, 2 or 5 times a power of ten, at most 5 of them.
+/// The step between ticks, and how many it takes to reach `most`: steps of 1, 2 or 5 times a power of ten, at most 5 of
+/// them.
 fn scale(most: f64) -> (f64, u32) {
     if !(most > 0.0 && most.is_finite()) {
         return (1.0, 1);

@@ -1,8 +1,8 @@
-//! The whole loop from pixel to hit, as the renderer runs it: camera rays are made, traced and answered tile by tile, and
-//! all of that is timed.
+//! The whole loop from pixel to hit, as the renderer runs it: camera rays are made, traced and answered tile by tile,
+//! and all of that is timed.
 //!
-//! The loop is the renderer's own, stopped at the hits ([`Renderer::count_hits`]). A loop made for the benchmark would be
-//! simpler, and could show rates that no render has.
+//! The loop is the renderer's own, stopped at the hits ([`Renderer::count_hits`]). A loop made for the benchmark would
+//! be simpler, and could show rates that no render has.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -39,7 +39,8 @@ impl<'a> PixelLoop<'a> {
         self.0[at].count_hits(tracer)
     }
 
-    /// The rays of the loop, so that the answers to them can be compared: those that it asks a tracer for, tile by tile.
+    /// The rays of the loop, so that the answers to them can be compared: those that it asks a tracer for, tile by
+    /// tile.
     pub fn rays(&self) -> Vec<Ray> {
         let recorder = Recorder(Mutex::default());
         self.0[0].count_hits(&recorder);

@@ -1,9 +1,10 @@
 //! The rays that are timed: those of `benches/embree_ref.cpp`, formula by formula, in f32.
 //!
-//! 1024 x 1024 camera rays in blocks of 4 x 4, so that 8 or 16 neighbours make a packet; the blocks in tiles of 8 x 8 as
-//! a renderer would have them, not in rows across the picture, which is all the same to a packet. From each point they hit one
-//! diffuse ray, cosine-distributed about the normal, and one shadow ray towards a point light. Rays are made before any
-//! clock starts. Two more kinds, which `embree_ref` lacks, have a direction in common: those of an orthographic camera in the same place, and those towards a sun in the point light's direction.
+//! 1024 x 1024 camera rays in blocks of 4 x 4, so that 8 or 16 neighbours make a packet; the blocks in tiles of 8 x 8
+//! as a renderer would have them, not in rows across the picture, which is all the same to a packet. From each point
+//! they hit one diffuse ray, cosine-distributed about the normal, and one shadow ray towards a point light. Rays are
+//! made before any clock starts. Two more kinds, which `embree_ref` lacks, have a direction in common: those of an
+//! orthographic camera in the same place, and those towards a sun in the point light's direction.
 
 use serde::Serialize;
 
@@ -131,8 +132,8 @@ impl View {
         Camera::look_at(target + self.eye.as_dvec3(), target, self.frame(Vec3::Y).as_dvec3(), fov)
     }
 
-    /// Rays of each kind of `kinds` but [`Kind::Pixel`], made of `side` x `side` camera rays, whole tiles; `tracer` finds
-    /// where those from surfaces start.
+    /// Rays of each kind of `kinds` but [`Kind::Pixel`], made of `side` x `side` camera rays, whole tiles; `tracer`
+    /// finds where those from surfaces start.
     pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind], side: usize) -> Vec<RaySet> {
         let side = side.next_multiple_of(TILE);
         let mut primary = self.primary(side);

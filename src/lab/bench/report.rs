@@ -82,8 +82,8 @@ pub struct TraversalRow {
     pub turns: Vec<f64>,
 }
 
-/// Native's rate over Embree's, each at the width with its best median: the median over the turns of the ratios within a
-/// turn.
+/// Native's rate over Embree's, each at the width with its best median: the median over the turns of the ratios within
+/// a turn.
 #[derive(Clone, Debug, Serialize)]
 pub struct Ratio {
     /// What the rays are for.

@@ -19,7 +19,8 @@ use crate::trace::{Tracer, Width, World};
 /// The widths that are measured.
 pub const WIDTHS: [Width; 3] = [Width::One, Width::Eight, Width::Sixteen];
 
-/// As long as all builds together have not taken so many seconds they are repeated: a single one of a small mesh takes less than a millisecond, and says nothing.
+/// As long as all builds together have not taken so many seconds they are repeated: a single one of a small mesh takes
+/// less than a millisecond, and says nothing.
 const BUILDING: f64 = 0.25;
 
 /// But no more often than this, if not asked to.
@@ -31,7 +32,8 @@ pub struct Contender {
     pub backend: &'static str,
     /// As it is set up: `default`, `fast`, `robust` ...
     pub mode: &'static str,
-    /// Whether its answers must be right, and equal to the bit to those of every other exact one. So it is for native engines, unless they use a textbook's method.
+    /// Whether its answers must be right, and equal to the bit to those of every other exact one. So it is for native
+    /// engines, unless they use a textbook's method.
     pub is_exact: bool,
     /// Builds it, on rayon's current pool or as many threads.
     pub build: Box<Build>,

@@ -1,10 +1,12 @@
-//! Time against the number of primitives, for every accelerator: which are linear, which are not, and from where on it matters.
+//! Time against the number of primitives, for every accelerator: which are linear, which are not, and from where on it
+//! matters.
 //!
-//! Two families of triangles: *scattered* ones of no order, with edges of about the distance to the next, which is what grids are
-//! good at; and a *terrain*, a mesh in which most of space is empty. The same rays for all accelerators, from a sphere around the scene to points in its
-//! bounds; the best of a few passes, and of a few builds that are short, counts, since whatever else the machine does makes them slower and never faster. An accelerator
-//! that takes longer than a limit for a step is not asked for more primitives, nor is one that would take more memory than there may be, by
-//! what it took for each primitive while it was built before.
+//! Two families of triangles: *scattered* ones of no order, with edges of about the distance to the next, which is what
+//! grids are good at; and a *terrain*, a mesh in which most of space is empty. The same rays for all accelerators, from
+//! a sphere around the scene to points in its bounds; the best of a few passes, and of a few builds that are short,
+//! counts, since whatever else the machine does makes them slower and never faster. An accelerator that takes longer
+//! than a limit for a step is not asked for more primitives, nor is one that would take more memory than there may be,
+//! by what it took for each primitive while it was built before.
 //!
 //! A grid is as good as its resolution: a second series traces one scene with grids from too coarse to too fine.
 
@@ -81,8 +83,8 @@ pub struct Point {
     pub microseconds_a_ray: f64,
     /// Memory for each triangle.
     pub bytes_a_primitive: f64,
-    /// By how much more the process held while it was built, at most; less than was used where freed memory was used again. None
-    /// where the system does not tell.
+    /// By how much more the process held while it was built, at most; less than was used where freed memory was used
+    /// again. None where the system does not tell.
     pub bytes_a_primitive_building: Option<f64>,
     /// What there is to say about how it was built.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -228,7 +230,8 @@ impl Scaling<'_> {
         Ok(())
     }
 
-    /// Where so many bytes for each of `count` primitives, and some to spare, are more than there may be: that, in words.
+    /// Where so many bytes for each of `count` primitives, and some to spare, are more than there may be: that, in
+    /// words.
     fn too_much(&self, bytes: f64, count: u64) -> Option<String> {
         let limit = self.max_memory? as f64;
         let wanted = process::held().unwrap_or(0) as f64 + SPARE * bytes * count as f64;

@@ -1,5 +1,5 @@
-//! The scaling report as a picture: time against number, both on logarithmic axes, on which a power is a line and its exponent the
-//! slope.
+//! The scaling report as a picture: time against number, both on logarithmic axes, on which a power is a line and its
+//! exponent the slope.
 
 use super::scaling::{Family, Point, ScalingReport, Swept};
 use crate::lab::drawing::{Anchor, Drawing, Font};

@@ -43,7 +43,8 @@ enum Procedural {
 }
 
 impl Procedural {
-    /// By its name: `terrain1000`, `architecture`, `architecture500`, `instances`, `instances100`. None for any other name.
+    /// By its name: `terrain1000`, `architecture`, `architecture500`, `instances`, `instances100`. None for any other
+    /// name.
     ///
     /// # Errors
     /// [`Error::Input`] for a number that is missing or out of range.
@@ -83,15 +84,15 @@ impl Subject {
         Ok(())
     }
 
-    /// The scene called `name`: `terrainN` (2 N^2 triangles), `architecture` or `architectureN` (N storeys), `instances`
-    /// or `instancesN` (N placements of one mesh), or a file.
-    /// All but terrains stand on a floor, two triangles at the bottom of their bounds.
+    /// The scene called `name`: `terrainN` (2 N^2 triangles), `architecture` or `architectureN` (N storeys),
+    /// `instances` or `instancesN` (N placements of one mesh), or a file. All but terrains stand on a floor, two
+    /// triangles at the bottom of their bounds.
     ///
     /// `up` says which axis of a *file* points up; nothing is turned, the camera stands accordingly.
     ///
     /// # Errors
-    /// [`Error::Input`] for a number out of range, for a file that cannot be used or has nothing to look at, and those of
-    /// [`World::new`].
+    /// [`Error::Input`] for a number out of range, for a file that cannot be used or has nothing to look at, and those
+    /// of [`World::new`].
     pub fn new(name: &str, up: UpAxis) -> Result<(Self, Vec<Warning>)> {
         let (mut scene, warnings, up, is_terrain) = match Procedural::parse(name)? {
             Some(rule) => (rule.scene(), Vec::new(), UpAxis::Y, matches!(rule, Procedural::Terrain(_))),

@@ -1,7 +1,7 @@
 //! Where numbers stand on an axis: by their logarithm, with a place of its own for zero.
 //!
-//! On a logarithmic axis zero has no place, and leaving it out, or putting it where the smallest number is, would hide the best
-//! there is: it gets a bin beyond the axis' end, apart from it.
+//! On a logarithmic axis zero has no place, and leaving it out, or putting it where the smallest number is, would hide
+//! the best there is: it gets a bin beyond the axis' end, apart from it.
 
 /// Share of the length that the bin of zero takes.
 const ZERO_BIN: f64 = 0.14;

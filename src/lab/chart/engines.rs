@@ -1,4 +1,5 @@
-//! Native and Embree, in every mode and width: rays a second of whole renders, against hits that exact arithmetic refutes.
+//! Native and Embree, in every mode and width: rays a second of whole renders, against hits that exact arithmetic
+//! refutes.
 
 use std::time::Instant;
 

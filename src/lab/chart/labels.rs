@@ -1,8 +1,8 @@
 //! Where the words beside points go, so that they neither cover each other nor a point.
 //!
-//! One after the other, each takes the free place that is nearest to its point, of a few on rings around it; from the second ring on a
-//! line leads there. What finds none is left out: the numbers are in the table. Moving all of them at once until they fit, the usual
-//! alternative, would give every chart another look for one point more.
+//! One after the other, each takes the free place that is nearest to its point, of a few on rings around it; from the
+//! second ring on a line leads there. What finds none is left out: the numbers are in the table. Moving all of them at
+//! once until they fit, the usual alternative, would give every chart another look for one point more.
 
 use super::scatter::NOTE;
 
@@ -54,7 +54,8 @@ pub(super) fn place(points: &[((f64, f64), &str)], within: Area) -> Vec<Placed> 
 fn beside(index: usize, (x, y): (f64, f64), label: &str, ring: f64, (across, up): (f64, f64)) -> Placed {
     let (width, height) = (NOTE.size * LETTER * label.chars().count() as f64, NOTE.size * LINE);
     let end = (x + across * ring, y - up * ring);
-    // What of it is at the end of the line: the side that is nearer to the point, and the middle where that line runs straight.
+    // What of it is at the end of the line: the side that is nearer to the point, and the middle where that line runs
+    // straight.
     let (left, top) = (end.0 + (sign(across) - 1.0) / 2.0 * width, end.1 - (sign(up) + 1.0) / 2.0 * height);
     let area = [left, top, left + width, top + height];
     let lead = (ring > RINGS[0]).then_some([(x, y), end]);

@@ -11,9 +11,9 @@
 //! | `heat` | numbers as colours |
 //! | `page` | all charts as one page |
 //!
-//! Times are medians of runs in turn, from the smallest to the largest; what is right is told by the [oracle](super::oracle), by exact
-//! arithmetic or by a reference of many more samples. Times move with the machine, so that only what stands in one chart can be
-//! compared; counts of errors are the same on every machine.
+//! Times are medians of runs in turn, from the smallest to the largest; what is right is told by the
+//! [oracle](super::oracle), by exact arithmetic or by a reference of many more samples. Times move with the machine, so
+//! that only what stands in one chart can be compared; counts of errors are the same on every machine.
 
 mod axis;
 mod engines;

@@ -5,8 +5,8 @@ use crate::lab::bench::Spread;
 /// Of the normal distribution, for 95 %.
 const Z: f64 = 1.959_964;
 
-/// `count` of `cases` in parts of a million; the ends are those of Wilson's interval for 95 % (Wilson 1927, *Probable inference, the law of
-/// succession, and statistical inference*), which says something of no cases as well.
+/// `count` of `cases` in parts of a million; the ends are those of Wilson's interval for 95 % (Wilson 1927, *Probable
+/// inference, the law of succession, and statistical inference*), which says something of no cases as well.
 pub(super) fn per_million(count: u64, cases: u64) -> Spread {
     let n = cases.max(1) as f64;
     let p = count as f64 / n;

@@ -1,7 +1,7 @@
 //! Samplers, filters and adaptive sampling: seconds of a render against the error of its picture.
 //!
-//! The reference of each filter is rendered with that filter, since filters converge to pictures of their own; it is the mean of two with
-//! seeds of their own, whose difference says how far it is off itself.
+//! The reference of each filter is rendered with that filter, since filters converge to pictures of their own; it is
+//! the mean of two with seeds of their own, whose difference says how far it is off itself.
 
 use std::time::Instant;
 

@@ -1,8 +1,8 @@
 //! Where ways to meet a triangle fail: by how large it is, and how far from the origin of coordinates.
 //!
-//! Rays are aimed at points of the triangle and of its surroundings, and an answer is wrong where exact arithmetic, of the very corners
-//! and rays that the method was given, says otherwise. Far from the origin f32 has no room for small triangles: corners fall on
-//! the same few numbers, which the oracle sees as well.
+//! Rays are aimed at points of the triangle and of its surroundings, and an answer is wrong where exact arithmetic, of
+//! the very corners and rays that the method was given, says otherwise. Far from the origin f32 has no room for small
+//! triangles: corners fall on the same few numbers, which the oracle sees as well.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,5 @@
-//! Ways to meet a triangle: nanoseconds a test, at four shares of hits, against rays that slip through between two triangles.
+//! Ways to meet a triangle: nanoseconds a test, at four shares of hits, against rays that slip through between two
+//! triangles.
 
 use std::hint::black_box;
 use std::time::Instant;

@@ -1,7 +1,8 @@
 //! Letters as strokes, for pictures that have no fonts: lines between the crossings of a grid.
 //!
-//! The grid has columns 0 to 4 and rows 0 to 8; capitals reach from row 0 to row 6, the line they stand on, small letters begin
-//! at row 2, and what hangs below ends at row 8. A stroke is written as its points, column and row; strokes are parted by blanks.
+//! The grid has columns 0 to 4 and rows 0 to 8; capitals reach from row 0 to row 6, the line they stand on, small
+//! letters begin at row 2, and what hangs below ends at row 8. A stroke is written as its points, column and row;
+//! strokes are parted by blanks.
 
 /// Columns from one letter to the next.
 pub(super) const ADVANCE: f64 = 6.0;

@@ -6,8 +6,8 @@
 //! | `raster` | the elements as pixels |
 //! | `letters` | the letters of the pixels: strokes on a grid |
 //!
-//! A library that draws charts, or one that turns SVG into pixels, would do more and weigh more than the program; a chart needs lines, bars,
-//! circles and plain letters.
+//! A library that draws charts, or one that turns SVG into pixels, would do more and weigh more than the program; a
+//! chart needs lines, bars, circles and plain letters.
 
 mod letters;
 mod raster;

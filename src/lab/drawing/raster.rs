@@ -1,7 +1,7 @@
 //! The elements as pixels, each of which is covered by the share that an edge leaves of it.
 //!
-//! Shares are exact for rectangles, and for lines and circles those of a straight edge at the pixel's distance. Colours are mixed as
-//! light, so that thin lines keep their weight.
+//! Shares are exact for rectangles, and for lines and circles those of a straight edge at the pixel's distance. Colours
+//! are mixed as light, so that thin lines keep their weight.
 
 use super::letters::{ADVANCE, BASELINE, strokes};
 use super::{Anchor, Drawing, Element, Font};

@@ -58,8 +58,8 @@ pub(super) fn outcome(shape: &Shape, ray: &LocalRay) -> Outcome {
 
 /// Whether the ray passes so close by the side of the shape's box that f32 may find it outside.
 ///
-/// A slab's t is off by a few roundings of the way there, which is that of the ray's origin and the box together. What is
-/// flat along an axis stays so: both of its t are the same number.
+/// A slab's t is off by a few roundings of the way there, which is that of the ray's origin and the box together. What
+/// is flat along an axis stays so: both of its t are the same number.
 pub(super) fn may_pass_box(shape: &Shape, ray: &LocalRay) -> bool {
     let Aabb { min, max } = shape.bounds();
     if min.cmpgt(max).any() {

@@ -1,8 +1,8 @@
 //! A case in a file: triangles and spheres, and rays, to the bit.
 //!
 //! JSON, with every number a hexadecimal float in a string, because a decimal number in a JSON file passes through f64
-//! and whatever the program that wrote it thinks is short enough. Scene files, the alternative, hold what a scene is for,
-//! and are moved to their middle when they are read.
+//! and whatever the program that wrote it thinks is short enough. Scene files, the alternative, hold what a scene is
+//! for, and are moved to their middle when they are read.
 
 use std::path::Path;
 

@@ -10,9 +10,9 @@
 //! | `search` | a random search for cases that are in no catalogue |
 //! | `file` | a case in a file, to the bit |
 //!
-//! A case is a few worlds in f32, as tracers hold them, and rays in their coordinates; nothing is read, moved or rounded in
-//! between. The [`Oracle`](super::tree::Oracle) answers each ray once, and every subject is held against that. Pictures
-//! that look right, the usual test, would show one leak in a thousand and no wrong neighbour.
+//! A case is a few worlds in f32, as tracers hold them, and rays in their coordinates; nothing is read, moved or
+//! rounded in between. The [`Oracle`](super::tree::Oracle) answers each ray once, and every subject is held against
+//! that. Pictures that look right, the usual test, would show one leak in a thousand and no wrong neighbour.
 
 mod expected;
 pub mod file;
@@ -74,7 +74,8 @@ pub fn catalogue() -> impl Iterator<Item = Case> {
 }
 
 impl Case {
-    /// Its worlds, with about so many rays in all, and one at least; `seed` chooses among rays, and never changes a world.
+    /// Its worlds, with about so many rays in all, and one at least; `seed` chooses among rays, and never changes a
+    /// world.
     pub fn probes(&self, rays: usize, seed: u64) -> Vec<Probe> {
         let make = |rays| (self.make)(rays, &mut Random::new(seed, 0));
         let mut rays = rays.max(1);

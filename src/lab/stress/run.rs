@@ -34,7 +34,8 @@ pub struct Setup {
     pub rays: usize,
     /// Chooses the rays.
     pub seed: u64,
-    /// Whether the forms of a column share the rays out among them, for very many rays; otherwise each answers all of them.
+    /// Whether the forms of a column share the rays out among them, for very many rays; otherwise each answers all of
+    /// them.
     pub in_turns: bool,
 }
 

@@ -1,9 +1,9 @@
 //! A random search for rays on which a tracer and exact arithmetic differ.
 //!
-//! A few triangles, perhaps a sphere, and a handful of rays at their edges are changed again and again: by a step of f32,
-//! a power of two, a zero, a coordinate copied from elsewhere. A change stays if the textbooks' methods, which are cheap
-//! to ask and fail where the numbers are hard, fail on no fewer rays than before. So the search climbs towards the edge
-//! of f32, and the subjects are asked there. Without the climb, uniform rays find next to nothing.
+//! A few triangles, perhaps a sphere, and a handful of rays at their edges are changed again and again: by a step of
+//! f32, a power of two, a zero, a coordinate copied from elsewhere. A change stays if the textbooks' methods, which are
+//! cheap to ask and fail where the numbers are hard, fail on no fewer rays than before. So the search climbs towards
+//! the edge of f32, and the subjects are asked there. Without the climb, uniform rays find next to nothing.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,5 @@
-//! Cases that are hard for what searches: boxes without thickness, planes that triangles lie in, trees as deep as they get.
+//! Cases that are hard for what searches: boxes without thickness, planes that triangles lie in, trees as deep as they
+//! get.
 
 use super::triangles::bumpy_sphere;
 use super::{Case, Gate, Probe, loose, nudged, towards};

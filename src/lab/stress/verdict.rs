@@ -41,7 +41,8 @@ impl Fault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Gate {
-    /// Nothing is missed, nothing is made up: a neighbour at about the same distance will do. This is what f32 may be asked for.
+    /// Nothing is missed, nothing is made up: a neighbour at about the same distance will do. This is what f32 may be
+    /// asked for.
     Hits,
     /// The primitive of exact arithmetic, and of several at exactly the same t the one with the lowest id.
     Exact,

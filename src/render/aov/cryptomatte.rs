@@ -1,9 +1,9 @@
-//! Which objects and materials cover how much of each pixel: Cryptomatte (Friedman and Jones 2015, *Fully automatic ID mattes
-//! with support for motion blur and transparency*; specification 1.2).
+//! Which objects and materials cover how much of each pixel: Cryptomatte (Friedman and Jones 2015, *Fully automatic ID
+//! mattes with support for motion blur and transparency*; specification 1.2).
 //!
-//! A name's hash is its id, and its bits are written as those of a floating number. Of each pixel the six ids that cover most stand with
-//! their shares in three layers of two, the largest first. The names are in the file's header, those of which anything is
-//! seen: a manifest of a million instances would be larger than the picture.
+//! A name's hash is its id, and its bits are written as those of a floating number. Of each pixel the six ids that
+//! cover most stand with their shares in three layers of two, the largest first. The names are in the file's header,
+//! those of which anything is seen: a manifest of a million instances would be larger than the picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 

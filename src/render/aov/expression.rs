@@ -1,5 +1,5 @@
-//! Kinds of light paths, in Heckbert's notation (1990, *Adaptive radiosity textures for bidirectional ray tracing*): L D E
-//! is light that was scattered once, diffusely, before it came to the eye.
+//! Kinds of light paths, in Heckbert's notation (1990, *Adaptive radiosity textures for bidirectional ray tracing*): L
+//! D E is light that was scattered once, diffusely, before it came to the eye.
 //!
 //! | symbol | means |
 //! | --- | --- |
@@ -11,9 +11,10 @@
 //! | `x*`, `x+`, <code>x?</code> | any number of times, once or more, once at most |
 //! | <code>x\|y</code>, `(x)` | either; a group |
 //!
-//! Paths are found from the eye to the light, so that expressions are read backwards. Of each the positions of its letters are the
-//! states of an automaton (Glushkov 1961, *The abstract theory of automata*), and all expressions of a render are made one
-//! automaton without choices, so that following a path costs one look into a table however many they are.
+//! Paths are found from the eye to the light, so that expressions are read backwards. Of each the positions of its
+//! letters are the states of an automaton (Glushkov 1961, *The abstract theory of automata*), and all expressions of a
+//! render are made one automaton without choices, so that following a path costs one look into a table however many
+//! they are.
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,8 @@
 //! What the ray through each pixel's middle hits, and where.
 //!
-//! It goes through the middle of the lens when the shutter is half open, and passes through what covers less than half: nothing about it is left
-//! to chance, so that these channels are the same for any number of samples, and those of a ray that anyone can cast.
+//! It goes through the middle of the lens when the shutter is half open, and passes through what covers less than half:
+//! nothing about it is left to chance, so that these channels are the same for any number of samples, and those of a
+//! ray that anyone can cast.
 
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};

@@ -7,9 +7,9 @@
 //! | `expression` | which light: kinds of paths, in Heckbert's notation |
 //! | `cryptomatte` | which objects and materials cover how much of the pixel |
 //!
-//! Places and numbers have no average, so that those of one ray are taken, and of a ray that does not depend on samples or
-//! seed; a filtered depth, as many renderers write it, lies between the objects at every edge. Directions and colours are averaged
-//! with the picture's own samples and filter, which is what denoisers expect.
+//! Places and numbers have no average, so that those of one ray are taken, and of a ray that does not depend on samples
+//! or seed; a filtered depth, as many renderers write it, lies between the objects at every edge. Directions and
+//! colours are averaged with the picture's own samples and filter, which is what denoisers expect.
 //!
 //! A render that is asked for none of this does none of it: tiles have no tally, paths no route.
 

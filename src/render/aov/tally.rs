@@ -1,10 +1,11 @@
 //! What is added up for the pixels of a tile, sample by sample, beside their colours.
 //!
-//! Light is told apart by the route of each path: a state of the [`Automaton`] for each colour. Where a path goes on by chance,
-//! its direction could have come from several lobes, and what it carries is light of each of them. Which lobe that light is
-//! counted for is chosen by their shares, for red, green and blue apart, so that on average each gets what is its own,
-//! and all together exactly what the picture gets. To count it for the lobe that proposed the direction, which is simpler, would be wrong
-//! wherever lobes overlap; to follow each lobe's share would double the paths at each surface.
+//! Light is told apart by the route of each path: a state of the [`Automaton`] for each colour. Where a path goes on by
+//! chance, its direction could have come from several lobes, and what it carries is light of each of them. Which lobe
+//! that light is counted for is chosen by their shares, for red, green and blue apart, so that on average each gets
+//! what is its own, and all together exactly what the picture gets. To count it for the lobe that proposed the
+//! direction, which is simpler, would be wrong wherever lobes overlap; to follow each lobe's share would double the
+//! paths at each surface.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Rays of every other camera: parallel, of the whole sphere, through a lens with an opening, through one that bends lines, from one
-//! that moves.
+//! Rays of every other camera: parallel, of the whole sphere, through a lens with an opening, through one that bends
+//! lines, from one that moves.
 
 use super::no_ray;
 use crate::error::{Error, Result};
@@ -98,8 +98,8 @@ impl General {
     }
 }
 
-/// Evenly from the unit square to the unit disk (Shirley and Chiu 1997, *A low distortion map between disk and square*), or
-/// to the regular polygon in it.
+/// Evenly from the unit square to the unit disk (Shirley and Chiu 1997, *A low distortion map between disk and
+/// square*), or to the regular polygon in it.
 fn on_lens(xi: DVec2, blades: u32) -> DVec2 {
     let at_angle = |angle: f64| DVec2::new(libm::cos(angle), libm::sin(angle));
     if blades >= 3 {
@@ -117,8 +117,8 @@ fn on_lens(xi: DVec2, blades: u32) -> DVec2 {
     if x.abs() > y.abs() { at_angle(quarter * y / x) * x } else { at_angle(2.0 * quarter - quarter * x / y) * y }
 }
 
-/// What would be seen at `seen` (y up) without the distortion: Newton's method. None where the distortion maps nothing, or
-/// only what lies behind a fold.
+/// What would be seen at `seen` (y up) without the distortion: Newton's method. None where the distortion maps nothing,
+/// or only what lies behind a fold.
 fn undistorted(distortion: &Distortion, seen: DVec2) -> Option<DVec2> {
     let seen = DVec2::new(seen.x, -seen.y);
     let mut at = seen;

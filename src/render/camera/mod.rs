@@ -26,8 +26,8 @@ impl View {
     /// `centre` is [`World::centre`](crate::World).
     ///
     /// # Errors
-    /// [`Error::Usage`] for places, angles, heights and lenses that cannot be, for parts that do not go together, and for a view
-    /// so narrow that neighbouring pixels would have the same ray.
+    /// [`Error::Usage`] for places, angles, heights and lenses that cannot be, for parts that do not go together, and
+    /// for a view so narrow that neighbouring pixels would have the same ray.
     pub(super) fn new(camera: &Camera, centre: DVec3, width: u32, height: u32) -> Result<Self> {
         check_numbers(camera)?;
         let size = DVec2::new(f64::from(width), f64::from(height));
@@ -52,8 +52,8 @@ impl View {
     }
 
     /// The ray through a point of the film in pixels, from its top left corner, and through the point of the lens that
-    /// `lens` gives, evenly over the unit square, at a time from 0 to 1. Points of the film that the lens does not reach have a ray that is not
-    /// valid, and sees nothing.
+    /// `lens` gives, evenly over the unit square, at a time from 0 to 1. Points of the film that the lens does not
+    /// reach have a ray that is not valid, and sees nothing.
     pub(super) fn ray(&self, film: DVec2, lens: impl FnOnce() -> DVec2, time: f32) -> Ray {
         match self {
             Self::Pinhole(pinhole) => Ray { time, ..pinhole.ray(film) },

@@ -1,8 +1,9 @@
 //! Why a pixel is as bright as it is: the rays it depends on, what each of them met, and every share of light.
 //!
-//! The integrators themselves tell it: where a [`Trail`] is laid they note what they do, so that there is no second account of them that could
-//! say something else. A picture has no trail, and pays a branch for each surface and for each light asked. Recomputing the pixel
-//! in a slower renderer of its own, the alternative, would have every formula twice.
+//! The integrators themselves tell it: where a [`Trail`] is laid they note what they do, so that there is no second
+//! account of them that could say something else. A picture has no trail, and pays a branch for each surface and for
+//! each light asked. Recomputing the pixel in a slower renderer of its own, the alternative, would have every formula
+//! twice.
 
 mod trail;
 
@@ -47,7 +48,8 @@ pub struct SampleTrail {
 pub struct RayTrail {
     /// How often light was sent on since the camera.
     pub depth: u32,
-    /// Number in the tree of rays: those that ray n sends on are 2 n + 1, mirrored, and 2 n + 2, refracted; 0 for all of a path.
+    /// Number in the tree of rays: those that ray n sends on are 2 n + 1, mirrored, and 2 n + 2, refracted; 0 for all
+    /// of a path.
     pub number: u32,
     /// Where it starts.
     pub origin: [f64; 3],
@@ -59,7 +61,8 @@ pub struct RayTrail {
     pub weight: [f32; 3],
     /// What it met; none where it left the scene.
     pub hit: Option<HitTrail>,
-    /// What the sample gets from there without asking any light: what glows, the ambient light, what is behind everything, the fog on the way.
+    /// What the sample gets from there without asking any light: what glows, the ambient light, what is behind
+    /// everything, the fog on the way.
     pub own: [f32; 3],
     /// The lights that were asked there.
     pub lights: Vec<LightTrail>,
@@ -123,7 +126,8 @@ pub struct LightTrail {
     pub glossy: [f32; 3],
     /// What fog, or absorption inside of something, leaves of the light on its way.
     pub fog: [f32; 3],
-    /// What its answer counts: 1 / the number of questions, or what the choice of one light, and of this way to find it, makes of it.
+    /// What its answer counts: 1 / the number of questions, or what the choice of one light, and of this way to find
+    /// it, makes of it.
     pub share: f32,
     /// How much of the way is free, 0 to 1.
     pub visibility: f32,
@@ -132,8 +136,8 @@ pub struct LightTrail {
 }
 
 impl Renderer<'_> {
-    /// Renders a pixel, the same to the bit as in the whole picture, and tells why it is as it is. `steps` counts what a ray asks of
-    /// the engine, as [`Bvh::steps`](crate::trace::bvh::Bvh::steps) does.
+    /// Renders a pixel, the same to the bit as in the whole picture, and tells why it is as it is. `steps` counts what
+    /// a ray asks of the engine, as [`Bvh::steps`](crate::trace::bvh::Bvh::steps) does.
     pub fn explain<T: Tracer + ?Sized>(
         &self,
         tracer: &T,

@@ -59,7 +59,8 @@ impl Trail {
         }
     }
 
-    /// A ray was followed: `path` is what it was for, at its end; `own` what the sample gets of it without asking lights.
+    /// A ray was followed: `path` is what it was for, at its end; `own` what the sample gets of it without asking
+    /// lights.
     #[inline]
     pub(in crate::render) fn ray(
         &mut self,

@@ -1,8 +1,9 @@
-//! One sequence for the whole picture, dealt out to pixels along a curve, so that neighbours have samples that complement
-//! one another and their errors differ: what noise is left has no low frequencies (Ahmed and Wonka 2020, *Screen-space
-//! blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels*).
+//! One sequence for the whole picture, dealt out to pixels along a curve, so that neighbours have samples that
+//! complement one another and their errors differ: what noise is left has no low frequencies (Ahmed and Wonka
+//! 2020, *Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels*).
 //!
-//! Pixels are numbered along a Z-order curve of which every quadruple is shuffled, by a hash of the quadruples it lies in.
+//! Pixels are numbered along a Z-order curve of which every quadruple is shuffled, by a hash of the quadruples it lies
+//! in.
 
 use super::sobol::{scramble, second};
 use super::{pcg4d, unit};

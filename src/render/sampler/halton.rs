@@ -1,6 +1,7 @@
-//! Halton's sequence (1964, *Algorithm 247: radical-inverse quasi-random point sequence*) in bases 2 and 3, scrambled by
-//! Owen's method: each digit is permuted by a permutation that the digits before it choose. Shuffled by the same method in base 6, so that pairs of
-//! dimensions are not the same points in the same order: any power of six of the samples, from the first on, has one in each of as many equal cells.
+//! Halton's sequence (1964, *Algorithm 247: radical-inverse quasi-random point sequence*) in bases 2 and 3, scrambled
+//! by Owen's method: each digit is permuted by a permutation that the digits before it choose. Shuffled by the same
+//! method in base 6, so that pairs of dimensions are not the same points in the same order: any power of six of the
+//! samples, from the first on, has one in each of as many equal cells.
 
 use super::sobol::scramble;
 use super::stratified::permute;

@@ -1,9 +1,10 @@
 //! Where on a pixel, on a lens, in time its samples lie.
 //!
 //! Every number is a function of (pixel, sample, dimension, seed) and of nothing else, so that neither threads nor
-//! tiles show in a picture. What is sampled at once (a point of the pixel, of the lens) is a pair of dimensions; each pair
-//! is stratified by itself, and pairs are shuffled against one another (padding: Kollig and Keller 2002, *Efficient
-//! multidimensional sampling*). Sequences of many dimensions at once, the alternative, have bad pairs among them.
+//! tiles show in a picture. What is sampled at once (a point of the pixel, of the lens) is a pair of dimensions; each
+//! pair is stratified by itself, and pairs are shuffled against one another (padding: Kollig and Keller
+//! 2002, *Efficient multidimensional sampling*). Sequences of many dimensions at once, the alternative, have bad pairs among
+//! them.
 
 mod blue_noise;
 mod dimension;
@@ -30,7 +31,8 @@ pub enum Sampling {
     Halton,
     /// One sample in each cell of a grid, with its rows and columns evenly filled.
     Stratified,
-    /// The middles of a grid's cells, the same for every pixel, in another order for each choice: shows bands where others show noise.
+    /// The middles of a grid's cells, the same for every pixel, in another order for each choice: shows bands where
+    /// others show noise.
     Grid,
     /// Random numbers.
     Independent,
@@ -99,8 +101,8 @@ impl Sampler {
     }
 
     /// What the samples of a pixel have in common, computed once for all of them.
-    // Inlined, with `film`: a pattern that came back from a call would be copied by loads wider than the stores that made
-    // it, which wait for those.
+    // Inlined, with `film`: a pattern that came back from a call would be copied by loads wider than the stores that
+    // made it, which wait for those.
     #[inline]
     pub fn pattern(&self, x: u32, y: u32) -> Pattern {
         // A single sample is not hashed: every pixel has the same.
@@ -196,7 +198,8 @@ mod tests {
         Sampling::ALL.into_iter().filter(|&sampling| sampling != Sampling::Grid)
     }
 
-    /// Where on the pixel a sample is says nothing of when it is taken, of whatever sampler: of each quarter of one half is in each of the other.
+    /// Where on the pixel a sample is says nothing of when it is taken, of whatever sampler: of each quarter of one
+    /// half is in each of the other.
     #[test]
     fn choices_for_a_sample_are_not_alike() {
         for sampling in Sampling::ALL {

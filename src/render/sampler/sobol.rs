@@ -1,7 +1,7 @@
-//! The first two dimensions of Sobol's sequence (1967), shuffled and scrambled by Owen's method (1995, *Randomly permuted
-//! (t, m, s)-nets and (t, s)-sequences*), with the hash of Burley (2020, *Practical hash-based Owen scrambling*, JCGT 9(4))
-//! after Laine and Karras. Any power of two of the samples, from the first on, has one in each of as many equal cells, of
-//! every shape that halving gives.
+//! The first two dimensions of Sobol's sequence (1967), shuffled and scrambled by Owen's method (1995, *Randomly
+//! permuted (t, m, s)-nets and (t, s)-sequences*), with the hash of Burley (2020, *Practical hash-based Owen
+//! scrambling*, JCGT 9(4)) after Laine and Karras. Any power of two of the samples, from the first on, has one in each
+//! of as many equal cells, of every shape that halving gives.
 
 use super::unit;
 use crate::math::DVec2;

@@ -1,6 +1,6 @@
-//! Correlated multi-jittered samples (Kensler 2013, *Correlated multi-jittered sampling*, Pixar 13-01): stratified on the
-//! square and on both axes, for any number of them. Plain jitter on an m x n grid would leave prime numbers of samples
-//! stratified along one axis only.
+//! Correlated multi-jittered samples (Kensler 2013, *Correlated multi-jittered sampling*, Pixar 13-01): stratified on
+//! the square and on both axes, for any number of them. Plain jitter on an m x n grid would leave prime numbers of
+//! samples stratified along one axis only.
 
 use super::unit;
 use crate::math::DVec2;
@@ -17,8 +17,9 @@ pub(super) fn point(sample: u32, spp: u32, key: [u32; 4], jitter: [u32; 4]) -> D
     DVec2::new((column + (row + jx) / f64::from(n)) / f64::from(m), (f64::from(s) + jy) / f64::from(spp))
 }
 
-/// The middle of the `sample`th of `spp` cells, row by row or in the order that a key chooses: where on the pixel a sample is
-/// must not say when it is taken. Cells are alike in area: of as many as fill no grid some rows have one less, and are the lower for it.
+/// The middle of the `sample`th of `spp` cells, row by row or in the order that a key chooses: where on the pixel a
+/// sample is must not say when it is taken. Cells are alike in area: of as many as fill no grid some rows have one
+/// less, and are the lower for it.
 pub(super) fn grid(sample: u32, spp: u32, order: Option<u32>) -> DVec2 {
     let rows = spp.div_ceil(spp.isqrt());
     let (few, more) = (spp / rows, spp % rows);
@@ -74,7 +75,8 @@ mod tests {
         }
     }
 
-    /// What a pixel shows of an edge is its share of the pixel, as near as so many samples can tell; and nothing is missed at one end.
+    /// What a pixel shows of an edge is its share of the pixel, as near as so many samples can tell; and nothing is
+    /// missed at one end.
     #[test]
     fn a_grid_covers_the_pixel_evenly() {
         for spp in 1..200 {
@@ -83,7 +85,8 @@ mod tests {
             assert!(places.iter().all(|place| shuffled.contains(place)), "{spp}");
             let mean = places.iter().sum::<DVec2>() / f64::from(spp);
             assert!((mean - DVec2::splat(0.5)).abs().max_element() < 1e-12, "{spp}: {mean}");
-            // On either axis no strip has a share of the samples that differs from its width by more than the side of a cell.
+            // On either axis no strip has a share of the samples that differs from its width by more than the side of a
+            // cell.
             let side = 1.0 / f64::from(spp.isqrt());
             for edge in [0.3, 0.5, 0.7] {
                 let share = |is_below: &dyn Fn(&DVec2) -> bool| {

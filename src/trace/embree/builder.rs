@@ -71,8 +71,8 @@ pub(super) fn cost(device: &Device, mut items: Vec<Item>, rule: &Rule<'_>) -> Re
         buildProgress: None,
         userPtr: (&raw const *rule).cast_mut().cast(),
     };
-    // SAFETY: the arguments live through the call. `items` has room for as many as it is said to, and Embree writes what it
-    // adds before it reads it. The callbacks only read `rule`, which is Sync.
+    // SAFETY: the arguments live through the call. `items` has room for as many as it is said to, and Embree writes
+    // what it adds before it reads it. The callbacks only read `rule`, which is Sync.
     let root = unsafe { sys::rtcBuildBVH(&raw const arguments) };
     device.check("building a tree to be measured")?;
     if root.is_null() {
@@ -199,8 +199,8 @@ unsafe extern "C" fn split(
         None => [whole; 2],
     };
     for (side, out) in sides.into_iter().zip([left, right]) {
-        // SAFETY: Embree's to be written: three numbers, one that is not looked at, three more. Nothing else is, for Embree keeps its
-        // own numbers between them.
+        // SAFETY: Embree's to be written: three numbers, one that is not looked at, three more. Nothing else is, for
+        // Embree keeps its own numbers between them.
         unsafe {
             out.cast::<[f32; 3]>().write(side.min.to_array());
             (&raw mut (*out).upper_x).cast::<[f32; 3]>().write(side.max.to_array());

@@ -95,7 +95,8 @@ impl Device {
         self.state.bytes.load(Ordering::Relaxed).max(0).unsigned_abs()
     }
 
-    /// Does something in which Embree allocates, and tells how many more bytes it holds afterwards than it says by itself.
+    /// Does something in which Embree allocates, and tells how many more bytes it holds afterwards than it says by
+    /// itself.
     pub(super) fn untold_bytes<T>(&self, work: impl FnOnce() -> T) -> (T, usize) {
         let before = (allocated(), self.bytes());
         let done = work();

@@ -32,8 +32,8 @@ impl Lanes {
         }
     }
 
-    /// Where [`Reach::has`] holds for certain. Coordinates close to the reach and directions shorter than 1e-19 are left
-    /// undecided: the exact conditions take half as many instructions again.
+    /// Where [`Reach::has`] holds for certain. Coordinates close to the reach and directions shorter than 1e-19 are
+    /// left undecided: the exact conditions take half as many instructions again.
     #[inline(always)]
     pub fn surely_traceable(&self, reach: &Reach) -> BVec4A {
         let square = |[x, y, z]: [Vec4; 3]| x * x + y * y + z * z;

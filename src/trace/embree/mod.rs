@@ -1,9 +1,9 @@
 //! Intel Embree (Wald, Woop, Benthin, Johnson, Ernst 2014, *Embree: a kernel framework for efficient CPU ray tracing*).
 //!
 //! [`Embree`] is the engine; below it, `device` owns what every scene shares, `scene` builds and commits, `single` and
-//! `packet` lay rays out as Embree wants them, `lanes` turns four about, and `query` asks; `sah` measures the trees that
-//! Embree's `builder` makes. Versions 3.13 and 4 are served by one source: the bindings are
-//! made from the header that is installed, and the two layouts of a hit are told apart by their size alone.
+//! `packet` lay rays out as Embree wants them, `lanes` turns four about, and `query` asks; `sah` measures the trees
+//! that Embree's `builder` makes. Versions 3.13 and 4 are served by one source: the bindings are made from the header
+//! that is installed, and the two layouts of a hit are told apart by their size alone.
 //!
 //! A scene under construction and a committed one are different types, so that a query on an uncommitted scene, which
 //! Embree leaves undefined, does not compile. The simpler design, one type with a flag, would have cost a test and an
@@ -185,9 +185,9 @@ impl Embree {
 
     /// Bytes that Embree holds for this world: trees, placements and copies of the triangles.
     ///
-    /// Of placements Embree's memory monitor tells nothing but what their tree takes. Their transforms, and what else an instance is
-    /// (278 to 308 bytes in 3.13), are counted by what the C library's allocator hands out meanwhile, to whichever thread; where that is
-    /// not glibc's they are left out.
+    /// Of placements Embree's memory monitor tells nothing but what their tree takes. Their transforms, and what else
+    /// an instance is (278 to 308 bytes in 3.13), are counted by what the C library's allocator hands out meanwhile, to
+    /// whichever thread; where that is not glibc's they are left out.
     pub fn bytes(&self) -> usize {
         self.device.bytes() + self.untold_bytes
     }

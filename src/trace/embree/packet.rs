@@ -93,7 +93,8 @@ pub(super) fn each<T: Copy + Default, const G: usize>(
     }
 }
 
-/// Has rays loaded that come soon after those of a packet: from memory mostly, as those of the native tracer's bundles are. There may be none.
+/// Has rays loaded that come soon after those of a packet: from memory mostly, as those of the native tracer's bundles
+/// are. There may be none.
 #[inline(always)]
 fn fetch_ahead<const G: usize>(rays: &Packet<Ray, G>) {
     const AHEAD: usize = 192;
@@ -193,8 +194,8 @@ impl<const G: usize> RayHits<G> {
         self.hits[hit_row::INSTANCE] = [[sys::INVALID_ID; 4]; G];
     }
 
-    /// What the rays of a group hit. `ids` turns Embree's ids of a geometry and an instance into the scene's; `recent` is
-    /// kept from group to group.
+    /// What the rays of a group hit. `ids` turns Embree's ids of a geometry and an instance into the scene's; `recent`
+    /// is kept from group to group.
     ///
     /// Neighbours mostly hit the same geometry or nothing, so four rays are one comparison each, and no branch depends
     /// on a single ray unless they differ.

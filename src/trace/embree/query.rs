@@ -206,7 +206,8 @@ pub(super) unsafe extern "C" fn on_occluded(args: *const sys::RTCOccludedFunctio
     );
 }
 
-/// Calls `found` with the lane, what `hit_at` makes of the shape, the ray and t, and the rays for each active ray that hits the shape.
+/// Calls `found` with the lane, what `hit_at` makes of the shape, the ray and t, and the rays for each active ray that
+/// hits the shape.
 fn each_hit<T>(
     list: &ShapeList,
     primitive: u32,

@@ -1,7 +1,7 @@
 //! How far from zero a ray may be, so that Embree's numbers suffice: in the world and in every object that is placed.
 //!
-//! Debian's Embree is built with an assertion that ends the process on a ray with a coordinate above [`MAX`]; and it holds
-//! rays of objects to the same, after it has moved them by the inverse that it makes of a transform in f32.
+//! Debian's Embree is built with an assertion that ends the process on a ray with a coordinate above [`MAX`]; and it
+//! holds rays of objects to the same, after it has moved them by the inverse that it makes of a transform in f32.
 
 use crate::error::{Error, Result};
 use crate::math::{Affine3, Mat3};
@@ -60,8 +60,8 @@ impl Reach {
     }
 }
 
-/// The largest coordinate of a ray in the world that stays below [`MAX`] in the object, with a factor of 2 to spare; none where
-/// the inverse is beyond f32.
+/// The largest coordinate of a ray in the world that stays below [`MAX`] in the object, with a factor of 2 to spare;
+/// none where the inverse is beyond f32.
 fn reach(to_world: &Affine3) -> Option<f32> {
     // As Embree does: the adjugate over the determinant, in f32.
     let m = to_world.matrix3;

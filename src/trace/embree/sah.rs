@@ -1,10 +1,11 @@
-//! What trees of Embree's own builder cost by the surface area heuristic, so that trees can be compared and not only rates.
+//! What trees of Embree's own builder cost by the surface area heuristic, so that trees can be compared and not only
+//! rates.
 //!
-//! Embree does not show the trees of its scenes. But `rtcBuildBVH` runs the same builder on boxes. It is given the boxes of
-//! the triangles and the settings that Embree 3.13 and 4 use for scenes of eight children a node and blocks of four
-//! triangles (`kernels/bvh/bvh_builder_sah.cpp`), and what it makes is counted as
-//! [`Bvh::sah_cost`](crate::trace::bvh::Bvh::sah_cost) counts. To read nodes out of Embree's private memory, the alternative,
-//! depends on the version.
+//! Embree does not show the trees of its scenes. But `rtcBuildBVH` runs the same builder on boxes. It is given the
+//! boxes of the triangles and the settings that Embree 3.13 and 4 use for scenes of eight children a node and blocks of
+//! four triangles (`kernels/bvh/bvh_builder_sah.cpp`), and what it makes is counted as
+//! [`Bvh::sah_cost`](crate::trace::bvh::Bvh::sah_cost) counts. To read nodes out of Embree's private memory, the
+//! alternative, depends on the version.
 
 use super::builder::{self, Item, Rule, item};
 use super::device::Device;
@@ -19,9 +20,10 @@ const BLOCK: u32 = 4;
 /// Most items in a leaf of a scene: seven blocks.
 const MAX_IN_LEAF: u32 = 7 * BLOCK;
 
-/// The surface area heuristic's cost of the trees that Embree's builder makes for `world`: in tests of a block as
-/// the native tree has them ([`Bvh::BLOCK`](crate::trace::bvh::Bvh::BLOCK)), of which a node costs `node_cost`. High quality splits triangles, except where scenes are robust or compact:
-/// there it is medium, as in Embree. 0 for an empty world.
+/// The surface area heuristic's cost of the trees that Embree's builder makes for `world`: in tests of a block as the
+/// native tree has them ([`Bvh::BLOCK`](crate::trace::bvh::Bvh::BLOCK)), of which a node costs `node_cost`. High
+/// quality splits triangles, except where scenes are robust or compact: there it is medium, as in Embree. 0 for an
+/// empty world.
 ///
 /// # Errors
 /// [`Error::Backend`](crate::Error::Backend) for what Embree reports.

@@ -1,7 +1,7 @@
 //! A single ray and its hit as Embree lays them out.
 //!
-//! What is judged by four rays at a time is whether Embree can trace them: one by one, that took half of all instructions around
-//! a query.
+//! What is judged by four rays at a time is whether Embree can trace them: one by one, that took half of all
+//! instructions around a query.
 
 use super::lanes::Lanes;
 use super::packet::{ALL_BITS, hit_row};

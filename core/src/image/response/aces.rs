@@ -1,6 +1,6 @@
-//! The Academy Color Encoding System's rendering of a scene for sRGB displays, as S. Hill's fit of 2016 has it (in M. Pettineo's
-//! *BakingLab*): linear Rec. 709 to the working primaries AP1, less saturated as the reference rendering transform makes
-//! them; one rational curve in place of the rendering's and the display's; back again.
+//! The Academy Color Encoding System's rendering of a scene for sRGB displays, as S. Hill's fit of 2016 has it (in M.
+//! Pettineo's *BakingLab*): linear Rec. 709 to the working primaries AP1, less saturated as the reference rendering
+//! transform makes them; one rational curve in place of the rendering's and the display's; back again.
 //!
 //! The transforms themselves, the alternative, are splines of many pieces in logarithms, and hardly look different.
 
@@ -35,8 +35,8 @@ mod tests {
     use super::*;
     use crate::math::{DMat3, DVec3};
 
-    /// The matrices from the standards: primaries and white of AP1 (SMPTE ST 2065-1, Academy S-2014-004), Bradford's adaptation,
-    /// and the factors of saturation of the transforms (RRT_SAT_FACTOR, ODT_SAT_FACTOR).
+    /// The matrices from the standards: primaries and white of AP1 (SMPTE ST 2065-1, Academy S-2014-004), Bradford's
+    /// adaptation, and the factors of saturation of the transforms (RRT_SAT_FACTOR, ODT_SAT_FACTOR).
     #[test]
     fn matrices_follow_from_the_primaries() {
         let white = [0.32168, 0.33767];

@@ -1,5 +1,5 @@
-//! A curve with a toe and a shoulder like film's (Hable 2010, *Uncharted 2: HDR lighting*, Game Developers Conference; constants as in his
-//! *Filmic tonemapping operators* of that year).
+//! A curve with a toe and a shoulder like film's (Hable 2010, *Uncharted 2: HDR lighting*, Game Developers Conference;
+//! constants as in his *Filmic tonemapping operators* of that year).
 
 /// Strength of the shoulder.
 const A: f32 = 0.15;

@@ -1,8 +1,10 @@
-//! What a camera makes of radiance, where it becomes codes: exposure, white balance and a response curve, in this order.
+//! What a camera makes of radiance, where it becomes codes: exposure, white balance and a response curve, in this
+//! order.
 //!
 //! Files of floating values (OpenEXR, Radiance) keep radiance: what was developed cannot be undone, and whoever reads
 //! them has a camera of their own. So none of this is done to an [`Image`](crate::Image), but on the way to 8 bits.
-//! Developing the image first, the simpler way, would need a second one in memory, and a rule of who must not develop it again.
+//! Developing the image first, the simpler way, would need a second one in memory, and a rule of who must not develop
+//! it again.
 
 mod aces;
 mod filmic;
@@ -23,7 +25,8 @@ pub const MAX_STOPS: f32 = 64.0;
 pub struct Response {
     /// Stops, at most [`MAX_STOPS`] up or down: radiance counts 2^exposure times.
     pub exposure: f32,
-    /// Kelvin, within [`TEMPERATURES`] (what is beyond counts as its end): light of this temperature becomes white. None leaves colours as they are.
+    /// Kelvin, within [`TEMPERATURES`] (what is beyond counts as its end): light of this temperature becomes white.
+    /// None leaves colours as they are.
     pub white_balance: Option<f32>,
     /// From there to what is shown.
     pub curve: Curve,
@@ -39,7 +42,8 @@ pub enum Curve {
     Srgb,
     /// With a toe and a shoulder like film's (Hable 2010, *Uncharted 2: HDR lighting*), then as sRGB.
     Filmic,
-    /// As the Academy's reference rendering and its output for sRGB show a scene (Hill 2016, a fit of the *Academy Color Encoding System* 1.0), then as sRGB.
+    /// As the Academy's reference rendering and its output for sRGB show a scene (Hill 2016, a fit of the *Academy
+    /// Color Encoding System* 1.0), then as sRGB.
     Aces,
 }
 

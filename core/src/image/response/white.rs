@@ -1,9 +1,10 @@
 //! White balance: light of a temperature becomes white.
 //!
-//! The white of a temperature is daylight's from 4000 K on (CIE 15:2004, *Colorimetry*: phases of daylight), and below that a black body's
-//! (Krystek 1985, *An algorithm to calculate correlated colour temperature*, Color Research and Application 10); at 4000 K the two are 0.007 apart in
-//! y. Colours are adapted by Bradford's transform (Lam 1985, *Metamerism and colour constancy*), in the linear form that colour management
-//! has (ISO 15076-1). Scaling R, G and B by themselves, the simpler way, turns colours that are not grey.
+//! The white of a temperature is daylight's from 4000 K on (CIE 15:2004, *Colorimetry*: phases of daylight), and below
+//! that a black body's (Krystek 1985, *An algorithm to calculate correlated colour temperature*, Color Research and
+//! Application 10); at 4000 K the two are 0.007 apart in y. Colours are adapted by Bradford's transform (Lam
+//! 1985, *Metamerism and colour constancy*), in the linear form that colour management has (ISO 15076-1). Scaling R, G and B
+//! by themselves, the simpler way, turns colours that are not grey.
 
 use std::ops::RangeInclusive;
 

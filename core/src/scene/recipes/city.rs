@@ -1,7 +1,7 @@
 //! Towers of triangles that are as high as the tower and as wide as a window.
 //!
-//! The boxes of such triangles overlap the boxes of their neighbours; those of [`architecture`](crate::scene::architecture)
-//! are slanted as well, and nearly empty.
+//! The boxes of such triangles overlap the boxes of their neighbours; those of
+//! [`architecture`](crate::scene::architecture) are slanted as well, and nearly empty.
 
 use std::f32::consts::TAU;
 

@@ -1,9 +1,9 @@
 //! Scenes made by rule, at any size, with camera, lights and materials.
 //!
-//! Six follow the descriptions of Haines's Standard Procedural Databases (Haines 1987, *A proposal for standard graphics
-//! environments*), which have measured ray tracers ever since; the code and the proportions are this project's own. All
-//! stand with +y up and are the same on every system: their only randomness is a hash of whole numbers, and sines come from
-//! libm.
+//! Six follow the descriptions of Haines's Standard Procedural Databases (Haines 1987, *A proposal for standard
+//! graphics environments*), which have measured ray tracers ever since; the code and the proportions are this project's
+//! own. All stand with +y up and are the same on every system: their only randomness is a hash of whole numbers, and
+//! sines come from libm.
 //!
 //! Materials keep to what the Neutral File Format can say, so that every scene can be written in it.
 

@@ -5,9 +5,9 @@ use crate::math::Vec3;
 use crate::scene::{Geometry, Material, Mesh};
 use crate::shape::{Shape, Sphere};
 
-/// A square of two triangles, each divided into four again and again, where the middle of every edge is lifted at random by
-/// up to its length times this (Fournier, Fussell, Carpenter 1982, *Computer rendering of stochastic models*). What lifts a
-/// point is a hash of its place in the grid, so that triangles that share an edge agree.
+/// A square of two triangles, each divided into four again and again, where the middle of every edge is lifted at
+/// random by up to its length times this (Fournier, Fussell, Carpenter 1982, *Computer rendering of stochastic
+/// models*). What lifts a point is a hash of its place in the grid, so that triangles that share an edge agree.
 const ROUGHNESS: f64 = 0.35;
 
 pub(super) fn make(generations: u32) -> Scene {

@@ -1,7 +1,7 @@
 //! A teapot, after Newell's (Crow 1987, *The origins of the teapot*).
 //!
-//! Body and lid are turned from his profile, six cubic Bezier curves; spout and handle are tubes along curves near his. So it
-//! is his teapot in outline, and half the data of his 32 patches.
+//! Body and lid are turned from his profile, six cubic Bezier curves; spout and handle are tubes along curves near his.
+//! So it is his teapot in outline, and half the data of his 32 patches.
 
 use std::f64::consts::TAU;
 

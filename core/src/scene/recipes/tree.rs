@@ -8,8 +8,8 @@ use crate::shape::{Cone, Shape, Sphere};
 /// How much shorter and thinner a branch is than what it grows from, and the angle between them in degrees; for both
 /// branches.
 const BRANCHES: [(f64, f64, f64); 2] = [(0.82, 0.75, 22.0), (0.7, 0.6, 48.0)];
-/// The second branch is on the other side of the first; every generation is turned by this, in degrees, close to the golden
-/// angle.
+/// The second branch is on the other side of the first; every generation is turned by this, in degrees, close to the
+/// golden angle.
 const TURN: f64 = 137.5;
 
 /// Branches are cones, closed by a sphere at their upper end; 2^(n + 1) - 1 of each.

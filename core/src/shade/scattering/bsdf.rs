@@ -1,8 +1,8 @@
 //! All lobes of a surface together, for integrators that follow one of them at random.
 //!
-//! A lobe is chosen by about how much light it sends on, a direction by the lobe's own pdf; the pdf of the
-//! result is the sum over all lobes, so that directions that several lobes can give are not noisier than others (Veach and
-//! Guibas 1995, *Optimally combining sampling techniques for Monte Carlo rendering*: the balance heuristic).
+//! A lobe is chosen by about how much light it sends on, a direction by the lobe's own pdf; the pdf of the result is
+//! the sum over all lobes, so that directions that several lobes can give are not noisier than others (Veach and Guibas
+//! 1995, *Optimally combining sampling techniques for Monte Carlo rendering*: the balance heuristic).
 
 use std::f64::consts::PI;
 
@@ -66,8 +66,8 @@ impl<'a> Bsdf<'a> {
         self.chances.iter().filter(|&&chance| chance > 0.0).count() > 1
     }
 
-    /// For light along `to_light`. A light that cannot be seen is seen in no mirror either, however blunt: highlights alone show it, and its
-    /// pdf is that of directions among them.
+    /// For light along `to_light`. A light that cannot be seen is seen in no mirror either, however blunt: highlights
+    /// alone show it, and its pdf is that of directions among them.
     pub fn eval(&self, to_light: DVec3, can_be_seen: bool) -> BsdfValue {
         let Shading { normal, horizon, to_viewer, highlight, .. } = self.shading;
         let [diffuse, shiny, mirrored, refracted] = self.chances;

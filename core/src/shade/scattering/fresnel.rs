@@ -1,7 +1,7 @@
 //! How much of the light an interface mirrors: Fresnel's equations (1823) for light that is not polarised.
 
-/// The share that is mirrored where light arrives at `cosine` to the normal, `ior` being the index of what is behind the
-/// interface relative to where the light is. 1 under total internal reflection.
+/// The share that is mirrored where light arrives at `cosine` to the normal, `ior` being the index of what is behind
+/// the interface relative to where the light is. 1 under total internal reflection.
 pub(super) fn reflectance(cosine: f64, ior: f64) -> f64 {
     let behind = 1.0 - (1.0 - cosine * cosine) / (ior * ior);
     if cosine <= 0.0 || behind <= 0.0 {

@@ -1,10 +1,10 @@
 //! The highlights of Phong (1975, *LightSample for computer generated pictures*) and Blinn (1977, *Models of light
 //! reflection for computer synthesized pictures*), classic and energy-conserving.
 //!
-//! The classic highlight is ks cos^n: no cosine of the light, and no scale, so that wide ones send on more than they get. The
-//! energy-conserving one is pi f cos with f scaled so that straight on exactly ks is sent on, and nowhere more: (n + 2) / (2 pi)
-//! for Phong's (Lafortune and Willems 1994), (n + 2) (n + 4) / (8 pi (2^(-n/2) + n)) for Blinn's (Giesen 2009, *Derivation of the Phong and
-//! Blinn-Phong normalization factors*).
+//! The classic highlight is ks cos^n: no cosine of the light, and no scale, so that wide ones send on more than they
+//! get. The energy-conserving one is pi f cos with f scaled so that straight on exactly ks is sent on, and nowhere
+//! more: (n + 2) / (2 pi) for Phong's (Lafortune and Willems 1994), (n + 2) (n + 4) / (8 pi (2^(-n/2) + n)) for Blinn's
+//! (Giesen 2009, *Derivation of the Phong and Blinn-Phong normalization factors*).
 
 use super::warp;
 use crate::math::{DVec2, DVec3, Vec3};
@@ -96,8 +96,8 @@ impl Highlight {
 mod tests {
     use super::*;
 
-    /// However sharp, an energy-conserving highlight sends on its colour where the viewer looks straight at it, and nowhere more: the mean of what samples are
-    /// worth, in a white surround.
+    /// However sharp, an energy-conserving highlight sends on its colour where the viewer looks straight at it, and
+    /// nowhere more: the mean of what samples are worth, in a white surround.
     #[test]
     fn sharp_highlights_make_no_energy() {
         const SIDE: i32 = 64;

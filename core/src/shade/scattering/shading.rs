@@ -24,7 +24,8 @@ pub struct Shading {
 }
 
 impl Shading {
-    /// The colours of `material`, as it [is at](crate::shade::appearance::at) `point`, seen along `direction`, in a scene with the given ambient light.
+    /// The colours of `material`, as it [is at](crate::shade::appearance::at) `point`, seen along `direction`, in a
+    /// scene with the given ambient light.
     pub fn new(
         point: &SurfacePoint,
         direction: Vec3,

@@ -1,9 +1,9 @@
 //! Where light goes on from a surface: mirrored and refracted, and how it is divided between the two.
 //!
-//! With [`Interface::Shares`] the material says how (Whitted 1980, *An improved illumination model for shaded display*): under total internal
-//! reflection the refracted share is black, as in Whitted's paper; nothing is moved to the mirrored share, for the two
-//! are the material's to choose. With the other two, Fresnel's equations say it, and what cannot be refracted is
-//! mirrored.
+//! With [`Interface::Shares`] the material says how (Whitted 1980, *An improved illumination model for shaded
+//! display*): under total internal reflection the refracted share is black, as in Whitted's paper; nothing is moved to
+//! the mirrored share, for the two are the material's to choose. With the other two, Fresnel's equations say it, and
+//! what cannot be refracted is mirrored.
 
 use super::fresnel;
 use crate::math::{DVec3, Vec3};

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use crate::math::{DVec2, DVec3, tangents};
 
-/// A direction with the pdf cos / pi about `normal` (Malley's method: Pharr, Jakob, Humphreys 2016, *Physically Based Rendering*
-/// 13.6.3).
+/// A direction with the pdf cos / pi about `normal` (Malley's method: Pharr, Jakob, Humphreys 2016, *Physically Based
+/// Rendering* 13.6.3).
 pub(super) fn cosine(normal: DVec3, xi: DVec2) -> DVec3 {
     around(normal, (1.0 - xi.x).sqrt(), xi.y)
 }

@@ -1,9 +1,10 @@
 //! A binary BVH: the plainest tree of boxes that is not slow, and the yardstick of the other indices.
 //!
-//! Built from the top by the surface area heuristic with 16 bins an axis (Goldsmith, Salmon 1987, *Automatic creation of object
-//! hierarchies for ray tracing*; Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*); visited children
-//! front to back, leaving out what begins behind the nearest hit. Bins are by centres, so each item is in one leaf. Median splits alone
-//! would be shorter by thirty lines, and traced half as fast on meshes of uneven density.
+//! Built from the top by the surface area heuristic with 16 bins an axis (Goldsmith, Salmon 1987, *Automatic creation
+//! of object hierarchies for ray tracing*; Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*);
+//! visited children front to back, leaving out what begins behind the nearest hit. Bins are by centres, so each item is
+//! in one leaf. Median splits alone would be shorter by thirty lines, and traced half as fast on meshes of uneven
+//! density.
 
 use std::ops::Range;
 

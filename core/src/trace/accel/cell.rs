@@ -7,11 +7,12 @@ use crate::math::{Aabb, DVec3, Vec3};
 pub struct Cell {
     /// Tells it from the tree's other cells.
     pub number: u32,
-    /// The half-spaces whose intersection it is: points p with normal . p <= offset. First the six sides of everything's box, then the planes
-    /// from the root down. A point within one of these belongs to the cell above, or in front.
+    /// The half-spaces whose intersection it is: points p with normal . p <= offset. First the six sides of
+    /// everything's box, then the planes from the root down. A point within one of these belongs to the cell above, or
+    /// in front.
     pub sides: Vec<(DVec3, f64)>,
-    /// Items that reach into it, among them those within planes that bound it: triangles in the order of parts and of their meshes, then
-    /// shapes.
+    /// Items that reach into it, among them those within planes that bound it: triangles in the order of parts and of
+    /// their meshes, then shapes.
     pub items: Vec<u32>,
 }
 

@@ -1,9 +1,10 @@
-//! Bounding volumes: a flat list of boxes, one around each group of items (Clark 1976, *Hierarchical geometric models for
-//! visible surface algorithms*).
+//! Bounding volumes: a flat list of boxes, one around each group of items (Clark 1976, *Hierarchical geometric models
+//! for visible surface algorithms*).
 //!
-//! A ray that misses a group's box misses all that is in it; one that enters tests every item there. Groups are the scene's own,
-//! its geometries and placements: good for a few well separated things, linear in their number all the same. Boxes are entered in the order in
-//! which the ray meets them, so that a near hit spares the groups behind it; a ray seldom enters many.
+//! A ray that misses a group's box misses all that is in it; one that enters tests every item there. Groups are the
+//! scene's own, its geometries and placements: good for a few well separated things, linear in their number all the
+//! same. Boxes are entered in the order in which the ray meets them, so that a near hit spares the groups behind it; a
+//! ray seldom enters many.
 
 use std::ops::Range;
 

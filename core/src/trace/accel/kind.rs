@@ -18,8 +18,8 @@ use crate::trace::{Batch, Tracer, World};
 
 /// A tracer that may know where points are.
 pub trait Accelerator: Tracer + Send {
-    /// The cell of what is fixed in the world that holds a point. None outside of everything, and by accelerators that do not
-    /// divide space: all but the kd-tree and the BSP tree.
+    /// The cell of what is fixed in the world that holds a point. None outside of everything, and by accelerators that
+    /// do not divide space: all but the kd-tree and the BSP tree.
     fn locate(&self, _point: Vec3) -> Option<Cell> {
         None
     }

@@ -9,14 +9,14 @@
 //! | `kd` | a kd-tree: planes across the axes, by the surface area heuristic (Wald, Havran 2006, *On building fast kd-trees*) |
 //! | `bsp` | a BSP tree: planes of the scene's own polygons (Ize, Wald, Parker 2008, *Ray tracing with the BSP tree*) |
 //!
-//! An accelerator is an `Index` over boxes that knows no primitive: it says which items a ray may hit, near ones first. One
-//! tracer, `Accelerated`, does the rest with any of them: an index over what is fixed, one over each object, one over the
-//! places where objects stand. Primitives are tested by the very code of brute force, so hits are the same to the bit as long
-//! as no index loses an item; `ray` has the bounds on rounding by which none does. A tracer for each accelerator, the
-//! alternative, would have its own leaves, levels and proofs, six times.
+//! An accelerator is an `Index` over boxes that knows no primitive: it says which items a ray may hit, near ones first.
+//! One tracer, `Accelerated`, does the rest with any of them: an index over what is fixed, one over each object, one
+//! over the places where objects stand. Primitives are tested by the very code of brute force, so hits are the same to
+//! the bit as long as no index loses an item; `ray` has the bounds on rounding by which none does. A tracer for each
+//! accelerator, the alternative, would have its own leaves, levels and proofs, six times.
 //!
-//! The native [`Bvh`](super::bvh) is no `Index`: what makes it fast (eight boxes, bundles, blocks of triangles) is what the
-//! trait hides.
+//! The native [`Bvh`](super::bvh) is no `Index`: what makes it fast (eight boxes, bundles, blocks of triangles) is what
+//! the trait hides.
 
 mod binary;
 mod bsp;
@@ -74,8 +74,9 @@ trait Index: Sized + Send + Sync {
     /// Over all items.
     fn build(input: &Input<'_>, options: &Options) -> Self;
 
-    /// Calls `each` with every item whose box the ray enters before the limit, near ones first where that is known. `each`
-    /// gives the new limit, and infinity below zero to stop; of the leaf that the ray is in, the rest may come yet.
+    /// Calls `each` with every item whose box the ray enters before the limit, near ones first where that is known.
+    /// `each` gives the new limit, and infinity below zero to stop; of the leaf that the ray is in, the rest may come
+    /// yet.
     fn visit(&self, ray: &IndexRay, limit: f64, each: &mut impl FnMut(u32) -> f64);
 
     /// Memory it holds, in bytes.
@@ -269,9 +270,10 @@ impl<I: Index> Level<I> {
     }
 }
 
-/// Some of the last items that a ray was tested against, of those with the same last four bits one, for indices that hold an item in many cells (Shevtsov, Soupikov,
-/// Kapustin 2007, *Ray-triangle intersection algorithm for modern CPU architectures*: the inverse mailbox). A number in each item, the older way,
-/// would be written by all threads. What is forgotten is tested again, which changes nothing.
+/// Some of the last items that a ray was tested against, of those with the same last four bits one, for indices that
+/// hold an item in many cells (Shevtsov, Soupikov, Kapustin 2007, *Ray-triangle intersection algorithm for modern CPU
+/// architectures*: the inverse mailbox). A number in each item, the older way, would be written by all threads. What is
+/// forgotten is tested again, which changes nothing.
 struct Mailbox([u32; 16]);
 
 impl Mailbox {

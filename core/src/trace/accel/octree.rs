@@ -1,14 +1,15 @@
-//! An octree: space halved along all three axes at once, again and again (Glassner 1984, *Space subdivision for fast ray
-//! tracing*).
+//! An octree: space halved along all three axes at once, again and again (Glassner 1984, *Space subdivision for fast
+//! ray tracing*).
 //!
-//! An item lies in every octant that its box touches. A cell is split while it has more than [`LEAF`] items and splitting tells them apart. A ray
-//! passes an octant's planes in the order of their t: each plane cuts the range of t in two, first across x, then y, then z, and
-//! the pieces that are left are the children that it passes, near ones first (the parametric way of Revelles, Ureña, Lastra 2000,
-//! *An efficient parametric algorithm for octree traversal*, but for its table of next children: that is made for one t a plane, and
-//! here a plane has two, between which the ray is on both sides).
+//! An item lies in every octant that its box touches. A cell is split while it has more than [`LEAF`] items and
+//! splitting tells them apart. A ray passes an octant's planes in the order of their t: each plane cuts the range of t
+//! in two, first across x, then y, then z, and the pieces that are left are the children that it passes, near ones
+//! first (the parametric way of Revelles, Ureña, Lastra 2000, *An efficient parametric algorithm for octree traversal*,
+//! but for its table of next children: that is made for one t a plane, and here a plane has two, between which the ray
+//! is on both sides).
 //!
-//! The whole is a cube, so some planes lie beyond the reach that the ray's pad counts with. Their own rounding is larger, but items
-//! are farther from them than that.
+//! The whole is a cube, so some planes lie beyond the reach that the ray's pad counts with. Their own rounding is
+//! larger, but items are farther from them than that.
 
 use super::items::Input;
 use super::ray::{IndexRay, TInterval};
@@ -21,8 +22,8 @@ const LEAF: usize = 6;
 const DEEPEST: u32 = 20;
 /// References that eight children may have for each of their parent's: beyond, the parent stays a leaf.
 const MOST_OF_CHILDREN: usize = 3;
-/// References for each item that splitting may add in all; every cell has its share. Where boxes overlap, each level would add more than
-/// the one before.
+/// References for each item that splitting may add in all; every cell has its share. Where boxes overlap, each level
+/// would add more than the one before.
 const MAX_REFERENCES: usize = 12;
 
 /// The index.

@@ -1,13 +1,15 @@
 //! How far a ray strays from where it should be in an object's coordinates.
 //!
 //! **In an object.** The object's index is asked with the ray M^-1 (o, d), computed in f64. With B the inverse that a
-//! [`Placement`] holds and R = B M - 1, what should be is (1 + R)^-1 B (o, d); so a vector B v is off by at most 2 |R| |B v|, and its
-//! own computation by gamma(8) |B| |v| more, translation and all. R is computed when the scene is built ([`residual`]).
+//! [`Placement`] holds and R = B M - 1, what should be is (1 + R)^-1 B (o, d); so a vector B v is off by at most 2 |R|
+//! |B v|, and its own computation by gamma(8) |B| |v| more, translation and all. R is computed when the scene is built
+//! ([`residual`]).
 //!
-//! **Shapes** are met by the ray rounded to f32 ([`Placement::object_ray`]), and a hit at a rim may lie 2^-26 of its t beside the shape:
-//! 2^-24 of the coordinates for the rounding, as much again for the rims.
+//! **Shapes** are met by the ray rounded to f32 ([`Placement::object_ray`]), and a hit at a rim may lie 2^-26 of its t
+//! beside the shape: 2^-24 of the coordinates for the rounding, as much again for the rims.
 //!
-//! At t the ray is off by the sum of origin's error and t times the direction's; and where it is in the object's box, |t| is at most (reach +
+//! At t the ray is off by the sum of origin's error and t times the direction's; and where it is in the object's box,
+//! |t| is at most (reach +
 //! |origin|) / |direction| on the axis where the direction is largest.
 
 use std::borrow::Cow;

@@ -1,13 +1,15 @@
 //! A ray as indices see it: f64, with all the doubt there is about it in one number an axis.
 //!
-//! An index decides where to look by comparing t at planes. With u = 2^-53, t = (plane - origin) * (1 / direction) is off by
-//! less than 4 u of the *distance* |plane| + |origin| seen along the axis, since the operands are f32 numbers and the
-//! subtraction is the first thing that rounds. So planes are met `pad` too early and `pad` too late, with a pad of 8 u (reach +
+//! An index decides where to look by comparing t at planes. With u = 2^-53, t = (plane - origin) * (1 / direction) is
+//! off by less than 4 u of the *distance* |plane| + |origin| seen along the axis, since the operands are f32 numbers
+//! and the subtraction is the first thing that rounds. So planes are met `pad` too early and `pad` too late, with a pad
+//! of 8 u (reach +
 //! |origin|), where the reach bounds the coordinates of all planes: whatever happens at t happens within the bounds that the
 //! index computes. An object's ray strays by more ([`placed`](super::placed)); that is added.
 //!
-//! A component that is zero has an infinite reciprocal: planes ahead of the origin are then never met, those behind it always. Only
-//! a plane that goes through the padded origin itself gives 0 * infinity; every comparison is written so that NaN changes nothing.
+//! A component that is zero has an infinite reciprocal: planes ahead of the origin are then never met, those behind it
+//! always. Only a plane that goes through the padded origin itself gives 0 * infinity; every comparison is written so
+//! that NaN changes nothing.
 //!
 //! The hit's own t is rounded too, to f64 and then to f32: by 2^-23 of itself in all. That goes into the range.
 

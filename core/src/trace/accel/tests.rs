@@ -1,4 +1,5 @@
-//! Every index on boxes and rays whose coordinates are small whole numbers, so that it is known exactly what is met and when.
+//! Every index on boxes and rays whose coordinates are small whole numbers, so that it is known exactly what is met and
+//! when.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -77,8 +78,8 @@ fn visited<I: Index>(index: &I, ray: &IndexRay, limit: f64) -> BTreeSet<u32> {
     items
 }
 
-/// Every box that holds a point of the ray is visited, with the point's t as the limit and with t below the end; at any scale, and by a ray that
-/// strays. And by far not all boxes are visited.
+/// Every box that holds a point of the ray is visited, with the point's t as the limit and with t below the end; at any
+/// scale, and by a ray that strays. And by far not all boxes are visited.
 fn finds_what_it_must<I: Index>(name: &str, most_visits: f64, options: &Options) {
     for (seed, count) in [(1, 1), (2, 7), (3, 300), (4, 4000)] {
         let unit = lattice(count, seed);
@@ -130,8 +131,8 @@ fn every_index_finds_what_rays_meet() {
     }
 }
 
-/// After a visit that says to stop nothing else is visited; behind the limit that a visit gives nothing either, but for what is
-/// in the same cell.
+/// After a visit that says to stop nothing else is visited; behind the limit that a visit gives nothing either, but for
+/// what is in the same cell.
 #[test]
 fn visits_stop_when_told_and_behind_the_limit() {
     fn check<I: Index>(name: &str) {
@@ -168,8 +169,8 @@ fn triangles(count: u64) -> Vec<[Vec3; 3]> {
     (0..count).map(triangle).collect()
 }
 
-/// Of all cells that points were found in, exactly one has a point inside, going by the signs of planes alone; and what reaches to a point is
-/// in its cell.
+/// Of all cells that points were found in, exactly one has a point inside, going by the signs of planes alone; and what
+/// reaches to a point is in its cell.
 #[test]
 fn points_are_in_the_one_cell_whose_planes_say_so() {
     let corners = triangles(400);
@@ -223,7 +224,8 @@ fn a_bsp_tree_says_where_it_stopped() {
 #[test]
 fn the_first_hit_is_enough() {
     fn check<I: Index>(name: &str) {
-        // Slanted pieces that no plane tells apart, so that most are in one leaf; which is the nearest depends on the ray.
+        // Slanted pieces that no plane tells apart, so that most are in one leaf; which is the nearest depends on the
+        // ray.
         let mut random = Random::new(5, 0);
         let triangle = |_| {
             let [a, b, c] = [-1.0, 0.0, 1.0].map(|z| z + 0.5 * random.unit());

@@ -1,7 +1,7 @@
 //! All hits of a ray, in one traversal.
 //!
-//! Every candidate is decided in f64, or exactly, and gathered; which of the triangles that touch at an edge or a corner is
-//! crossed, [`Crossings`] says when all are there.
+//! Every candidate is decided in f64, or exactly, and gathered; which of the triangles that touch at an edge or a
+//! corner is crossed, [`Crossings`] says when all are there.
 
 use super::Bvh;
 use super::block::LANES;
@@ -27,12 +27,12 @@ impl Bvh {
     /// All hits of `ray` with `tmin <= t <= tmax`, into `hits`, which is cleared first: ordered by t (in f64, before it
     /// is rounded), then by id.
     ///
-    /// Each crossing counts once. A closed mesh is hit an even number of times from outside and an odd number from inside,
-    /// also by a ray through its edges and corners. There the lowest id among the triangles that touch stands for
-    /// each crossing, of those that are crossed in the same sense (inwards, or outwards). A ray that only touches an edge or
-    /// a corner counts as two crossings, in and out, or as none: as if it were moved aside by next to nothing in x, and if
-    /// that leaves it there in y, then z. So a ray may have a closest hit and no crossing. Closed shapes are crossed twice,
-    /// also where the ray is a tangent.
+    /// Each crossing counts once. A closed mesh is hit an even number of times from outside and an odd number from
+    /// inside, also by a ray through its edges and corners. There the lowest id among the triangles that touch stands
+    /// for each crossing, of those that are crossed in the same sense (inwards, or outwards). A ray that only touches
+    /// an edge or a corner counts as two crossings, in and out, or as none: as if it were moved aside by next to
+    /// nothing in x, and if that leaves it there in y, then z. So a ray may have a closest hit and no crossing. Closed
+    /// shapes are crossed twice, also where the ray is a tangent.
     ///
     /// Triangles that coincide count each. The ends of the range are held against every triangle's own t, rounded to
     /// f32: parity is that of the range where no edge lies within that rounding of its ends.

@@ -11,7 +11,8 @@ pub(super) const LANES: usize = 8;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Block {
-    /// At least the largest component of an edge. With the corners, for whoever tests them needs it: at the end it cost a cache line more.
+    /// At least the largest component of an edge. With the corners, for whoever tests them needs it: at the end it cost
+    /// a cache line more.
     pub size: f32,
     /// A bit for every lane that has a triangle.
     pub lanes: u32,

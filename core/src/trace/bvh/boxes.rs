@@ -1,11 +1,13 @@
 //! A tree over boxes of which the caller knows what is in them, and which may move.
 //!
-//! What moves has two trees of the same shape: with the boxes where they are at time 0, and at time 1. A ray finds a node's boxes between the two, at its own time
-//! (Glassner 1988, *Spacetime ray tracing for animation*): boxes around whole ways would all be entered where things move by more than their size.
+//! What moves has two trees of the same shape: with the boxes where they are at time 0, and at time 1. A ray finds a
+//! node's boxes between the two, at its own time (Glassner 1988, *Spacetime ray tracing for animation*): boxes around
+//! whole ways would all be entered where things move by more than their size.
 //!
 //! The builder and the walk know no primitive; here they are lent to callers whose primitives the library does not have
-//! (Embree's user geometry, instances of other scenes, curves), who ask in [`visits`](super::visits), and to what moves in a scene. They are told which boxes a ray enters, or are near a point, by their place among
-//! the leaves: what is kept in that order is together in memory where it is together in space.
+//! (Embree's user geometry, instances of other scenes, curves), who ask in [`visits`](super::visits), and to what moves
+//! in a scene. They are told which boxes a ray enters, or are near a point, by their place among the leaves: what is
+//! kept in that order is together in memory where it is together in space.
 
 use std::fmt;
 
@@ -52,8 +54,9 @@ impl BoxTree {
         Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), Child::MAX, &options)
     }
 
-    /// Over boxes that move, from where the first of each pair is at time 0 to where the second is at time 1, in straight lines. Rays before and after that
-    /// find them where they are then. Left out is what is empty or not finite at either time.
+    /// Over boxes that move, from where the first of each pair is at time 0 to where the second is at time 1, in
+    /// straight lines. Rays before and after that find them where they are then. Left out is what is empty or not
+    /// finite at either time.
     ///
     /// # Panics
     /// As [`BoxTree::build`] does.

@@ -1,12 +1,14 @@
 //! What rays hit for sure, in flights, where triangles and rays are rounded from those that are meant.
 //!
-//! A scene in f64 is traced as a scene in f32 that is a little off, by rays that are a little off. The reject test has bounds for that
-//! ([`Blur`]), so nearly always it either leaves out a triangle or knows it to be hit, whatever the rounding. Where it does not, the
-//! caller has the corners in f64. Where a hit decides how far the ray looks, the caller is asked at once: to give the ray up and walk it again, tried first, took a quarter of the time. Where
-//! all hits are wanted, open triangles are told with the sure ones: to fetch corners one by one, while rays wait, took an eighth. Ids are told, and bounds on t; the caller computes t.
+//! A scene in f64 is traced as a scene in f32 that is a little off, by rays that are a little off. The reject test has
+//! bounds for that ([`Blur`]), so nearly always it either leaves out a triangle or knows it to be hit, whatever the
+//! rounding. Where it does not, the caller has the corners in f64. Where a hit decides how far the ray looks, the
+//! caller is asked at once: to give the ray up and walk it again, tried first, took a quarter of the time. Where all
+//! hits are wanted, open triangles are told with the sure ones: to fetch corners one by one, while rays wait, took an
+//! eighth. Ids are told, and bounds on t; the caller computes t.
 //!
-//! What no single triangle can tell is left to the caller: which of several hits at nearly the same t is first, who are told together; and how often a ray crosses
-//! at an edge, for which it decides the ray by [`super::alone::candidates`].
+//! What no single triangle can tell is left to the caller: which of several hits at nearly the same t is first, who are
+//! told together; and how often a ray crosses at an edge, for which it decides the ray by [`super::alone::candidates`].
 
 use std::marker::PhantomData;
 
@@ -26,8 +28,9 @@ use crate::trace::nearest::Nearest;
 /// What is certain about a ray.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) enum Certain<'a> {
-    /// It hits the `sure` triangles for sure, may hit the `open` ones, and no others that are wanted: one of the sure ones is the nearest, or any, or they are all. [`Bvh::triangle`] has
-    /// their names, `t` bounds on the t of each that is sure, but where any will do. None is open but where all are wanted.
+    /// It hits the `sure` triangles for sure, may hit the `open` ones, and no others that are wanted: one of the sure
+    /// ones is the nearest, or any, or they are all. [`Bvh::triangle`] has their names, `t` bounds on the t of each
+    /// that is sure, but where any will do. None is open but where all are wanted.
     Hits { sure: &'a [u32], t: &'a [[f32; 2]], open: &'a [u32] },
     /// Nothing.
     Doubt,
@@ -127,8 +130,8 @@ enum Any {}
 /// All hits.
 enum All {}
 
-/// Calls `take` with the id of each triangle of `candidates` that is hit, with bounds on its t, or about which `decide` leaves a doubt, too; until it
-/// says that this is enough.
+/// Calls `take` with the id of each triangle of `candidates` that is hit, with bounds on its t, or about which `decide`
+/// leaves a doubt, too; until it says that this is enough.
 #[inline(always)]
 fn each(
     index: u32,

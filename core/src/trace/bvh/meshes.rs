@@ -22,7 +22,8 @@ pub(super) struct Meshes {
 /// Triangles gone through by one thread at a time.
 const STRETCH: usize = 1 << 14;
 
-/// Meshes of a few triangles gone through by one thread at a time: to share out each by itself would take longer than to go through it.
+/// Meshes of a few triangles gone through by one thread at a time: to share out each by itself would take longer than
+/// to go through it.
 const TOGETHER: usize = 64;
 
 /// A mesh and its numbers.

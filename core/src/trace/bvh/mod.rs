@@ -33,8 +33,8 @@
 //! | `boxes`, `visits` | a tree over boxes, which may move; what callers ask of one over theirs |
 //! | `steps` | what a ray cannot but look at, counted |
 //!
-//! Trees for triangles, shapes and placed objects, still and moving, and not one with mixed leaves: each leaf loop knows its kind, and a
-//! scene without shapes or instances has none for them.
+//! Trees for triangles, shapes and placed objects, still and moving, and not one with mixed leaves: each leaf loop
+//! knows its kind, and a scene without shapes or instances has none for them.
 //!
 //! Boxes only ever reject what cannot be hit, and `shape::triangle::intersect` depends on
 //! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
@@ -198,10 +198,11 @@ impl Bvh {
     }
 
     /// The surface area heuristic's estimate of what a ray costs that meets the scene's box, in tests of a block of
-    /// [`Bvh::BLOCK`] triangles: the sum over nodes of [`Bvh::NODE_COST`] times their area, and over leaves of their area times the
-    /// blocks (or shapes) in them, divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic creation of object hierarchies for ray
-    /// tracing*; MacDonald, Booth 1990, *Heuristics for ray tracing using space subdivision*). A placed object costs as
-    /// much as its own tree, by the area of its box in the world; what moves counts where it is at time 0. 0 for an empty scene.
+    /// [`Bvh::BLOCK`] triangles: the sum over nodes of [`Bvh::NODE_COST`] times their area, and over leaves of their
+    /// area times the blocks (or shapes) in them, divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic
+    /// creation of object hierarchies for ray tracing*; MacDonald, Booth 1990, *Heuristics for ray tracing using space
+    /// subdivision*). A placed object costs as much as its own tree, by the area of its box in the world; what moves
+    /// counts where it is at time 0. 0 for an empty scene.
     pub fn sah_cost(&self) -> f64 {
         let of = |level: &Level| {
             let tests = |items: Range<u32>| items.len() as f64;

@@ -1,4 +1,5 @@
-//! A node of a tree: eight boxes, laid out component by component for eight-wide arithmetic, each as much wider than what is in it as tests of boxes round.
+//! A node of a tree: eight boxes, laid out component by component for eight-wide arithmetic, each as much wider than
+//! what is in it as tests of boxes round.
 
 use std::ops::Range;
 
@@ -11,7 +12,8 @@ use crate::trace::limits;
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
 
-/// Cost of visiting a node, in tests of a block. Measured: with a half rates are the same and a triangle takes a byte more, with two rays are 1 to 4 % slower.
+/// Cost of visiting a node, in tests of a block. Measured: with a half rates are the same and a triangle takes a byte
+/// more, with two rays are 1 to 4 % slower.
 pub(super) const NODE_COST: f32 = 1.0;
 
 /// What is in a slot of a node: another node, or a leaf's blocks; in one word, so that one instruction reorders eight.
@@ -157,16 +159,18 @@ impl Node {
     }
 }
 
-/// By what share of its coordinate each side of a box is farther out than what is in it, at least. Tests of boxes round relative to the coordinates of
-/// the box and of the ray's origin; the first part of that is in the box, so that rays need only know of the other, and what lies far away makes nothing near
-/// it less certain. What is in boxes together may be in a wider one, whose sides are farther out by more than their rounding grows.
+/// By what share of its coordinate each side of a box is farther out than what is in it, at least. Tests of boxes round
+/// relative to the coordinates of the box and of the ray's origin; the first part of that is in the box, so that rays
+/// need only know of the other, and what lies far away makes nothing near it less certain. What is in boxes together
+/// may be in a wider one, whose sides are farther out by more than their rounding grows.
 pub(super) const WIDENED: f32 = 7.0 * UNIT_ROUNDOFF;
 
-/// By what share of its largest coordinate besides: as far as a ray strays on its way there whose direction's components are off by this share of the
-/// largest, or corners that are rounded.
+/// By what share of its largest coordinate besides: as far as a ray strays on its way there whose direction's
+/// components are off by this share of the largest, or corners that are rounded.
 pub(super) const WIDENED_ALL: f32 = 5.0 * UNIT_ROUNDOFF;
 
-/// The box, which is not empty, with each side moved out by [`WIDENED`] and [`WIDENED_ALL`], and by more for what that rounds. It grows with the box.
+/// The box, which is not empty, with each side moved out by [`WIDENED`] and [`WIDENED_ALL`], and by more for what that
+/// rounds. It grows with the box.
 #[inline(always)]
 pub(super) fn widened(bounds: &Aabb) -> Aabb {
     let [min, max] = widened_corners([bounds.min.into(), bounds.max.into()]);

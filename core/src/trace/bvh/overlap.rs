@@ -73,7 +73,8 @@ mod tests {
     use crate::trace::bvh::simd::isa::Isa;
     use crate::trace::bvh::{BoxTree, Options};
 
-    /// Every box that overlaps another is named, those that touch it and those without an end among them, and few of the others.
+    /// Every box that overlaps another is named, those that touch it and those without an end among them, and few of
+    /// the others.
     #[test]
     fn what_overlaps_is_found() {
         let mut random = Random::new(64, 0);

@@ -1,5 +1,5 @@
-//! What a ray asks, as types: kernels are compiled once for each. The two questions of every tracer are here, those in f64 in
-//! [`certain`](super::certain).
+//! What a ray asks, as types: kernels are compiled once for each. The two questions of every tracer are here, those in
+//! f64 in [`certain`](super::certain).
 
 use super::Bvh;
 use super::block::Block;
@@ -29,7 +29,8 @@ pub(super) trait Query {
     }
     /// What is found so far, where a hit of another kind of primitive had the exact `t`; none where no more is wanted.
     fn resume(nearest: &mut Nearest, t: f64, answer: Self::Answer) -> bool;
-    /// Takes the candidates of block `index` of the triangles at `place`; those in doubt may be decided by, or listed for, who asked for the flight.
+    /// Takes the candidates of block `index` of the triangles at `place`; those in doubt may be decided by, or listed
+    /// for, who asked for the flight.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)] // What a step of a flight has.
     fn take(

@@ -29,9 +29,10 @@ impl Random {
         Vec3::new(self.number(most), self.number(most), self.number(most))
     }
 
-    /// A ray that has a single t, and a point that it meets there, no larger than f32 can tell: the smallest box with f32 bounds. Points and origins are of all sizes, axis by
-    /// axis, some of them no normal numbers. The ray that is meant has a direction that differs by up to `turn` times the largest component. None where there is no
-    /// valid one.
+    /// A ray that has a single t, and a point that it meets there, no larger than f32 can tell: the smallest box with
+    /// f32 bounds. Points and origins are of all sizes, axis by axis, some of them no normal numbers. The ray that is
+    /// meant has a direction that differs by up to `turn` times the largest component. None where there is no valid
+    /// one.
     pub fn ray_and_point(&mut self, turn: f32) -> Option<(Ray, Aabb)> {
         let mut size = || [1.0, 1e6, 1e-6, 1e-39][(2.0 * self.unit() + 2.0) as usize % 4];
         let (near, far) = (size(), size());

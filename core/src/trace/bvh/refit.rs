@@ -18,15 +18,16 @@ use crate::trace::unbounded::Unbounded;
 use crate::trace::{Part, World};
 
 impl Bvh {
-    /// Fits the trees to `world`, which differs from the one they were built for in positions of vertices, in shapes and
-    /// in transforms of placements only. Hits are those of a tree built for `world`, and rays are in its coordinates, of which [`World::centre`] may be
-    /// another than before: [`World::ray`] heeds that. [`World::new`] makes part of what is fixed of a group that
-    /// is placed once and stands still, shapes only where they are not turned or scaled, and an object of all others: where that may change, both worlds are
-    /// to be made by [`World::placed`].
+    /// Fits the trees to `world`, which differs from the one they were built for in positions of vertices, in shapes
+    /// and in transforms of placements only. Hits are those of a tree built for `world`, and rays are in its
+    /// coordinates, of which [`World::centre`] may be another than before: [`World::ray`] heeds that. [`World::new`]
+    /// makes part of what is fixed of a group that is placed once and stands still, shapes only where they are not
+    /// turned or scaled, and an object of all others: where that may change, both worlds are to be made by
+    /// [`World::placed`].
     ///
     /// # Errors
-    /// [`Error::Backend`] where `world` has other triangles, parts or objects, or where a triangle has become, or ceased to
-    /// be, one that can be hit; then the trees may be partly fitted, and are to be built anew.
+    /// [`Error::Backend`] where `world` has other triangles, parts or objects, or where a triangle has become, or
+    /// ceased to be, one that can be hit; then the trees may be partly fitted, and are to be built anew.
     pub fn refit(&mut self, world: &World) -> Result<()> {
         if self.objects.len() != world.objects.len() {
             return Err(changed(format!("{} objects, not {}", world.objects.len(), self.objects.len())));

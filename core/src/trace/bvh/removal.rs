@@ -1,14 +1,16 @@
 //! A tree without some of its triangles: they are taken out of their leaves, and boxes stay.
 //!
-//! As fast as what is taken out is small, whatever the tree's size. Rays still enter the boxes, so a tree of which much is gone is better built anew.
+//! As fast as what is taken out is small, whatever the tree's size. Rays still enter the boxes, so a tree of which much
+//! is gone is better built anew.
 
 use super::Bvh;
 use super::overlap::visit_overlapping;
 use crate::math::Aabb;
 
 impl Bvh {
-    /// Takes the fixed triangles of some geometries out, each of which has the box that is given with it around what can be hit, in the tree's coordinates: no ray hits
-    /// them any more. By rising geometry. Whether it could: a compact tree does not hold triangles itself, and stays as it was. What is taken out is not put back by
+    /// Takes the fixed triangles of some geometries out, each of which has the box that is given with it around what
+    /// can be hit, in the tree's coordinates: no ray hits them any more. By rising geometry. Whether it could: a
+    /// compact tree does not hold triangles itself, and stays as it was. What is taken out is not put back by
     /// [`Bvh::refit`], which is an error then.
     pub fn take_out(&mut self, geometries: &[(u32, Aabb)]) -> bool {
         if !self.has_fixed() {

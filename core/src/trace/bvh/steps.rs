@@ -15,8 +15,8 @@ use super::walk::Enter;
 use crate::ray::Ray;
 use crate::trace::Tracer;
 
-/// Parts of the trees that a ray enters no farther than its nearest hit: the least that any order of traversal looks at.
-/// What it does look at may be more, by what it enters before it has found the hit.
+/// Parts of the trees that a ray enters no farther than its nearest hit: the least that any order of traversal looks
+/// at. What it does look at may be more, by what it enters before it has found the hit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Steps {
     /// Nodes of eight boxes, in all trees.
@@ -101,7 +101,8 @@ mod tests {
     use crate::scene::{Geometry, Mesh, Scene};
     use crate::trace::World;
 
-    /// A ball on a ground that reaches a million times as far: rays at the ball look at no more than without the ground, and a few boxes of it.
+    /// A ball on a ground that reaches a million times as far: rays at the ball look at no more than without the
+    /// ground, and a few boxes of it.
     #[test]
     fn what_is_far_away_makes_nothing_near_uncertain() {
         const SIDE: u32 = 64;

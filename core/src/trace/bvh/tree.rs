@@ -68,8 +68,8 @@ impl Tree {
         size_of_val(&self.nodes[..])
     }
 
-    /// The surface area heuristic's cost, in half areas times tests: each node counts [`NODE_COST`], a leaf what `leaf` says of its
-    /// blocks.
+    /// The surface area heuristic's cost, in half areas times tests: each node counts [`NODE_COST`], a leaf what `leaf`
+    /// says of its blocks.
     pub fn cost(&self, leaf: impl Fn(Range<u32>) -> f64) -> f64 {
         let root = f64::from(NODE_COST) * f64::from(self.bounds.half_area());
         self.nodes.iter().fold(root, |sum, node| {
@@ -81,7 +81,8 @@ impl Tree {
         })
     }
 
-    /// This tree, whose leaves name one item each, with the nodes `below` in their place; `index_of(item)` is where in `below` an item's node is.
+    /// This tree, whose leaves name one item each, with the nodes `below` in their place; `index_of(item)` is where in
+    /// `below` an item's node is.
     pub fn over(self, below: Vec<Node>, index_of: impl Fn(u32) -> u32) -> Self {
         let mut above = self.nodes.into_vec();
         let base = above.len() as u32;

@@ -1,4 +1,5 @@
-//! What callers ask of a tree over their boxes: which of them a ray enters, and which are near to a point or to another box.
+//! What callers ask of a tree over their boxes: which of them a ray enters, and which are near to a point or to another
+//! box.
 
 use std::marker::PhantomData;
 
@@ -16,8 +17,9 @@ use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
 
 impl BoxTree {
-    /// Names boxes that `ray` enters at its time, or nearly, up to the t that `visitor` returns last (at first the ray's tmax), near ones
-    /// mostly first, until it has seen enough. The search takes each box that the ray enters; it may take others.
+    /// Names boxes that `ray` enters at its time, or nearly, up to the t that `visitor` returns last (at first the
+    /// ray's tmax), near ones mostly first, until it has seen enough. The search takes each box that the ray enters; it
+    /// may take others.
     pub fn visit(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> VisitFlow) {
         self.visit_as::<Closest>(ray, visitor);
     }
@@ -33,15 +35,15 @@ impl BoxTree {
         }
     }
 
-    /// Names boxes that have a point in common with `bounds`, and some that are only near it: in the same leaves, or by a millionth of coordinates. What moves is
-    /// at time 0.
+    /// Names boxes that have a point in common with `bounds`, and some that are only near it: in the same leaves, or by
+    /// a millionth of coordinates. What moves is at time 0.
     pub fn visit_overlapping(&self, bounds: &Aabb, visitor: &mut dyn FnMut(u32)) {
         visit_overlapping(self.tree(), self.isa(), bounds, visitor);
     }
 
-    /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`), near
-    /// ones mostly first, until it has seen enough; and some that are farther, in the same leaves or by a millionth of
-    /// coordinates. What moves is at time 0.
+    /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`),
+    /// near ones mostly first, until it has seen enough; and some that are farther, in the same leaves or by a
+    /// millionth of coordinates. What moves is at time 0.
     pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32) -> VisitFlow) {
         if !self.is_empty() && point.is_finite() {
             isa::dispatch(self.isa(), NearBoxes { tree: self.tree(), point, radius, visitor });

@@ -10,9 +10,9 @@ use crate::once::made_outside;
 const ROUNDING: f64 = 1e-13;
 
 impl PreciseScene {
-    /// Whether the triangles leave no opening: at every edge an even number of them meet, those of all meshes together. Corners are the same where they are at the same
-    /// place. Then every ray from a point crosses them an odd number of times, or each an even number; crossings are those of
-    /// [`count_batch`](Self::count_batch).
+    /// Whether the triangles leave no opening: at every edge an even number of them meet, those of all meshes together.
+    /// Corners are the same where they are at the same place. Then every ray from a point crosses them an odd number of
+    /// times, or each an even number; crossings are those of [`count_batch`](Self::count_batch).
     pub fn is_closed(&self) -> bool {
         *made_outside(&self.closed, || self.edges_are_even())
     }
@@ -51,8 +51,8 @@ impl PreciseScene {
         edges.chunk_by(|a, b| a == b).all(|run| run.len() % 2 == 0)
     }
 
-    /// How far around a point there is surely no triangle, by the squared distance that [`Self::distance_squared_batch`] tells of it. 0 where nothing is sure, as
-    /// if that is NaN.
+    /// How far around a point there is surely no triangle, by the squared distance that
+    /// [`Self::distance_squared_batch`] tells of it. 0 where nothing is sure, as if that is NaN.
     pub fn clearance(&self, point: DVec3, distance_squared: f64) -> f64 {
         let rounding = ROUNDING * (point.abs().max_element() + self.frame.farthest());
         // The larger number: NaN is none.

@@ -1,6 +1,7 @@
 //! The point of the meshes that is nearest to a given one.
 //!
-//! The tree finds it among what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
+//! The tree finds it among what may be nearest for all that rounding hides; distances are computed in f64 from the
+//! corners as they were given.
 
 use super::{PreciseScene, is_traceable};
 use crate::math::DVec3;
@@ -53,16 +54,18 @@ impl PreciseClosestPoint {
 const FARTHEST: f32 = 1e18;
 
 impl PreciseScene {
-    /// The point on any triangle that is nearest to `point`; at equal distances that of the lowest (geometry, primitive). Triangles
-    /// without an area count too. None for a point that is not finite, and where there are no triangles. Squares of distances above 1e154 are infinite.
+    /// The point on any triangle that is nearest to `point`; at equal distances that of the lowest (geometry,
+    /// primitive). Triangles without an area count too. None for a point that is not finite, and where there are no
+    /// triangles. Squares of distances above 1e154 are infinite.
     pub fn closest_point(&self, point: DVec3) -> Option<PreciseClosestPoint> {
         let mut nearest = [None];
         self.closest_point_batch(&[point], &mut nearest);
         nearest[0]
     }
 
-    /// The same for many points, into `nearest` of the same length. Up to 32 stretches of them go side by side; sooner where in each of these one point is near
-    /// the next: the triangle that was nearest to the last one is looked at first.
+    /// The same for many points, into `nearest` of the same length. Up to 32 stretches of them go side by side; sooner
+    /// where in each of these one point is near the next: the triangle that was nearest to the last one is looked at
+    /// first.
     ///
     /// # Panics
     /// Unless there is one answer a point.
@@ -70,8 +73,8 @@ impl PreciseScene {
         self.survey(points, nearest, None);
     }
 
-    /// How far these points are, squared, from any triangle, into `distances` of the same length; NaN where [`Self::closest_point_batch`] finds none.
-    /// That is a little faster than to find the points as well.
+    /// How far these points are, squared, from any triangle, into `distances` of the same length; NaN where
+    /// [`Self::closest_point_batch`] finds none. That is a little faster than to find the points as well.
     ///
     /// # Panics
     /// Unless there is one answer a point.
@@ -93,7 +96,8 @@ impl PreciseScene {
         self.bvh.nearest_triangles(self.discs(), survey.runs.len(), &mut survey);
     }
 
-    /// Makes what points need besides the tree, which the first of them does otherwise: threads that ask their first points together would make it once each.
+    /// Makes what points need besides the tree, which the first of them does otherwise: threads that ask their first
+    /// points together would make it once each.
     pub fn prepare_for_points(&self) {
         self.discs();
     }

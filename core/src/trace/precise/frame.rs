@@ -1,13 +1,16 @@
 //! The coordinates in which f64 meshes are traced, and how far rays and corners are off there.
 //!
-//! Meshes are moved so that zero is where most corners are, and scaled by a power of two so that the largest distance from it is in [1, 2): f32
-//! then keeps of them what it can, the most around zero, and neither overflows nor underflows, however small or large they are. With u = 2^-24 a corner is off by
-//! u times its largest coordinate, and by what f64 rounds at the distance from zero where they were, m. Its coordinate is at most that of a ray's origin
-//! and what is between both. By u times the latter it is off as a hit is by a direction that is off; and by the rest, c, in any case. The filter wants 3 c more than the
-//! origin of a ray is off by, and 3 u more than its direction is ([`super::super::bvh`]). What is large and far away thus leaves what is small as sharp as it is: only m knows of it.
+//! Meshes are moved so that zero is where most corners are, and scaled by a power of two so that the largest distance
+//! from it is in [1, 2): f32 then keeps of them what it can, the most around zero, and neither overflows nor
+//! underflows, however small or large they are. With u = 2^-24 a corner is off by u times its largest coordinate, and
+//! by what f64 rounds at the distance from zero where they were, m. Its coordinate is at most that of a ray's origin
+//! and what is between both. By u times the latter it is off as a hit is by a direction that is off; and by the rest,
+//! c, in any case. The filter wants 3 c more than the origin of a ray is off by, and 3 u more than its direction is
+//! ([`super::super::bvh`]). What is large and far away thus leaves what is small as sharp as it is: only m knows of it.
 //!
-//! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near; otherwise its rounding
-//! would count by its distance. Its direction is scaled to a largest component in [1, 2). A range of t is widened by the rounding.
+//! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near;
+//! otherwise its rounding would count by its distance. Its direction is scaled to a largest component in [1, 2). A
+//! range of t is widened by the rounding.
 
 use super::{PreciseMesh, PreciseRay, is_traceable};
 use crate::math::{DAabb, DVec3, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3};
@@ -23,7 +26,8 @@ pub(super) struct Frame {
     scale: f64,
     /// R, of everything in the tree.
     reach: f64,
-    /// m: what f64 rounds a point by that is as far away as the meshes are, in the tree's coordinates. Zero if nothing is moved or rounded.
+    /// m: what f64 rounds a point by that is as far away as the meshes are, in the tree's coordinates. Zero if nothing
+    /// is moved or rounded.
     moving_error: f64,
 }
 
@@ -50,12 +54,12 @@ const ROUNDING: f32 = 1.01 * UNIT_ROUNDOFF;
 /// What corners that are rounded count for besides.
 const CORNERS: f32 = 3.03 * UNIT_ROUNDOFF;
 
-/// By what a ray is off at most that is [common](LocalRay::is_common), relative to R, of what f64 rounds of its way from where it is moved. Those that come from farther
-/// away than some ten million R would make all others coarse.
+/// By what a ray is off at most that is [common](LocalRay::is_common), relative to R, of what f64 rounds of its way
+/// from where it is moved. Those that come from farther away than some ten million R would make all others coarse.
 const MOVED: f64 = 0.25 / (1u64 << 24) as f64;
 
-/// Rays that are farther [off](LocalRay::off) than this are held against every triangle: they come from some 1e30 R away, and what is much larger, or the square of it, has no room in
-/// f32.
+/// Rays that are farther [off](LocalRay::off) than this are held against every triangle: they come from some 1e30 R
+/// away, and what is much larger, or the square of it, has no room in f32.
 const LOST: f64 = 1e15;
 
 /// Less than this many times R is a ray's origin away, or it is moved.
@@ -103,7 +107,8 @@ impl Frame {
         (p - self.centre) * self.scale
     }
 
-    /// A point, and by how much each component is off from what is meant, corners included but for u times their distance from it.
+    /// A point, and by how much each component is off from what is meant, corners included but for u times their
+    /// distance from it.
     pub fn blurred_point(&self, p: DVec3) -> (Vec3, f64) {
         let local = self.local(p);
         let rounded = local.as_vec3();
@@ -126,8 +131,8 @@ impl Frame {
         self.centre.abs().max_element() + self.reach / self.scale
     }
 
-    /// Of many rays that are not [exact](Self::exact_ray), and [off](LocalRay::off) by so much at most, to be used as [`slab::ready`](super::super::bvh) does: in the second part relative to their own
-    /// size.
+    /// Of many rays that are not [exact](Self::exact_ray), and [off](LocalRay::off) by so much at most, to be used as
+    /// [`slab::ready`](super::super::bvh) does: in the second part relative to their own size.
     pub fn blur(&self, off: f64) -> Blur {
         let base = 4.0 * self.moving_error + off;
         let direction = if self.is_identity() { ROUNDING } else { ROUNDING + CORNERS };
@@ -199,7 +204,8 @@ impl Frame {
 /// Triangles whose corners are looked at for where most are.
 const SAMPLE: usize = 4096;
 
-/// On each axis a coordinate that as many corners are below as above, of some of those that can be traced; zero if there are none.
+/// On each axis a coordinate that as many corners are below as above, of some of those that can be traced; zero if
+/// there are none.
 fn middle(meshes: &[PreciseMesh]) -> DVec3 {
     let count = meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>();
     // Only corners of triangles that are taken are fetched.

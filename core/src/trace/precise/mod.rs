@@ -1,15 +1,16 @@
 //! Meshes and rays in f64, decided in f64.
 //!
-//! The trees are those of the native tracer, over the same triangles recentred, scaled by a power of two and rounded to f32; and rays
-//! are rounded likewise (`frame`). How far all that may be off is known, so a tree only ever rejects what is not hit, and what it
-//! knows to be hit is hit (`bvh/certain.rs`). What is in doubt is decided on the corners and the ray as they were given, in
-//! f64 with an error bound and where that does not suffice in exact arithmetic; and so is every t. So a hit depends on the
-//! f64 values alone: two triangles with a common edge leave no gap between them at 1e9 either, where steps of f32 are 64.
+//! The trees are those of the native tracer, over the same triangles recentred, scaled by a power of two and rounded to
+//! f32; and rays are rounded likewise (`frame`). How far all that may be off is known, so a tree only ever rejects what
+//! is not hit, and what it knows to be hit is hit (`bvh/certain.rs`). What is in doubt is decided on the corners and
+//! the ray as they were given, in f64 with an error bound and where that does not suffice in exact arithmetic; and so
+//! is every t. So a hit depends on the f64 values alone: two triangles with a common edge leave no gap between them at
+//! 1e9 either, where steps of f32 are 64.
 //!
 //! Trees over f64 boxes, the simpler alternative, would take twice the memory and half of the lanes.
 //!
-//! Where all coordinates are f32 to begin with, and lie well ([`PreciseScene::exact`]), the rounding is none, and rays in f32 may ask
-//! the [`Bvh`] itself.
+//! Where all coordinates are f32 to begin with, and lie well ([`PreciseScene::exact`]), the rounding is none, and rays
+//! in f32 may ask the [`Bvh`] itself.
 
 mod closed;
 mod closest_point;
@@ -69,8 +70,9 @@ impl PreciseRay {
         Self { origin, direction, tmin: 0.0, tmax: f64::INFINITY }
     }
 
-    /// Whether it can hit anything: an origin whose largest component is not above 1e80 ([`MAX_ORIGIN`]), a direction whose largest component is neither below
-    /// 1e-140 nor above 1e140, so that the square of one times the other holds in f64, and a range that is not empty. Any other ray misses.
+    /// Whether it can hit anything: an origin whose largest component is not above 1e80 ([`MAX_ORIGIN`]), a direction
+    /// whose largest component is neither below 1e-140 nor above 1e140, so that the square of one times the other holds
+    /// in f64, and a range that is not empty. Any other ray misses.
     pub fn is_valid(&self) -> bool {
         let placed = self.origin.abs().max_element() <= MAX_ORIGIN && !self.origin.is_nan();
         let directed = (1e-140..=1e140).contains(&self.direction.abs().max_element()) && !self.direction.is_nan();
@@ -83,7 +85,8 @@ impl PreciseRay {
 }
 
 impl PreciseHit {
-    /// On the triangle of this (primitive, geometry, instance). Adding 0 makes one zero of the two: t decides before the id does.
+    /// On the triangle of this (primitive, geometry, instance). Adding 0 makes one zero of the two: t decides before
+    /// the id does.
     #[inline]
     pub(super) fn new(hit: TriangleHit, (primitive, geometry, instance): (u32, u32, u32)) -> Self {
         Self { t: hit.t + 0.0, u: hit.u, v: hit.v, primitive, geometry, instance }
@@ -152,7 +155,8 @@ impl PreciseScene {
     /// Builds the tree, on rayon's current thread pool.
     ///
     /// # Errors
-    /// [`Error::Scene`] for a triangle that names a vertex that is not there, with its number; and for too many triangles.
+    /// [`Error::Scene`] for a triangle that names a vertex that is not there, with its number; and for too many
+    /// triangles.
     pub fn new(meshes: Vec<PreciseMesh>) -> Result<Self> {
         for (number, mesh) in meshes.iter().enumerate() {
             check_indices(number, mesh)?;
@@ -168,7 +172,8 @@ impl PreciseScene {
         let scene = Scene::from_geometries(meshes.iter().map(rounded).collect(), vec![Material::default()]);
         let world = World::new(&scene)?;
         debug_assert_eq!(world.centre, DVec3::ZERO, "the frame lies around zero");
-        // Not the high preset: a piece of a triangle is off by what its corners are, and boxes know only of their own coordinates.
+        // Not the high preset: a piece of a triangle is off by what its corners are, and boxes know only of their own
+        // coordinates.
         let (discs, closed, distinct) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
         Ok(Self { bvh: Bvh::build(&world), bounds, discs, closed, distinct, meshes, frame })
     }
@@ -183,7 +188,8 @@ impl PreciseScene {
         self.bounds
     }
 
-    /// The tracer over the meshes as they are, if f32 holds them: for rays in f32 it gives the same answers, but for hits at a t that f32 does not hold.
+    /// The tracer over the meshes as they are, if f32 holds them: for rays in f32 it gives the same answers, but for
+    /// hits at a t that f32 does not hold.
     pub fn exact(&self) -> Option<&Bvh> {
         self.frame.is_identity().then_some(&self.bvh)
     }
@@ -254,8 +260,8 @@ mod tests {
         }
     }
 
-    /// Hills of small triangles above the rim of one that is ten million or ten thousand million times as large: hardly more of them are looked at than without it; those in one
-    /// block with it, which is as coarse as it is large.
+    /// Hills of small triangles above the rim of one that is ten million or ten thousand million times as large: hardly
+    /// more of them are looked at than without it; those in one block with it, which is as coarse as it is large.
     #[test]
     fn what_is_far_away_makes_nothing_near_uncertain() {
         const SIDE: u32 = 50;
@@ -291,7 +297,8 @@ mod tests {
         assert!(*candidates >= 190 && !others.iter().any(is_more), "{counts:?}");
     }
 
-    /// Vertices that are no triangle's, far away or not numbers, neither make the tree coarse nor keep what is f32 from being traced so.
+    /// Vertices that are no triangle's, far away or not numbers, neither make the tree coarse nor keep what is f32 from
+    /// being traced so.
     #[test]
     fn vertices_of_no_triangle_change_nothing() {
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [0.0, 1.0, 0.25]].map(DVec3::from);

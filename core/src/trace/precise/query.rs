@@ -1,7 +1,8 @@
 //! What rays ask of meshes in f64: the nearest hit, any hit, all hits.
 //!
-//! Each batch goes through flights first, which name what is hit for sure, and what may be where all hits are wanted; t, u and v come from the corners in f64, in a step of its own
-//! ([`Pairs`]). Then those that are in doubt go one by one.
+//! Each batch goes through flights first, which name what is hit for sure, and what may be where all hits are wanted;
+//! t, u and v come from the corners in f64, in a step of its own ([`Pairs`]). Then those that are in doubt go one by
+//! one.
 
 use std::ops::Range;
 
@@ -21,8 +22,8 @@ const CHUNK: usize = 1024;
 const INVALID: Ray = Ray { origin: Vec3::NAN, direction: Vec3::ZERO, tmin: 0.0, tmax: 0.0, time: 0.0 };
 
 impl PreciseScene {
-    /// The nearest hit of each ray, into `hits` of the same length; at equal t that of the lowest id. On the calling thread, as all
-    /// queries.
+    /// The nearest hit of each ray, into `hits` of the same length; at equal t that of the lowest id. On the calling
+    /// thread, as all queries.
     ///
     /// # Panics
     /// Unless there is one answer a ray.
@@ -34,8 +35,9 @@ impl PreciseScene {
         }
     }
 
-    /// The geometry and the primitive of each ray's nearest hit, into `names` of the same length: those of [`Self::closest_batch`], without computing t, u and v
-    /// where there is no doubt. (Where sizes squared times a direction vanish in f64, [`Self::closest_batch`] may miss what is named here.)
+    /// The geometry and the primitive of each ray's nearest hit, into `names` of the same length: those of
+    /// [`Self::closest_batch`], without computing t, u and v where there is no doubt. (Where sizes squared times a
+    /// direction vanish in f64, [`Self::closest_batch`] may miss what is named here.)
     ///
     /// # Panics
     /// Unless there is one answer a ray.
@@ -58,7 +60,8 @@ impl PreciseScene {
         }
     }
 
-    /// The nearest hit of each ray of a chunk, but of those that `take` takes: it is told the ray and the triangle that it hits first for sure.
+    /// The nearest hit of each ray of a chunk, but of those that `take` takes: it is told the ray and the triangle that
+    /// it hits first for sure.
     fn nearest_of_chunk(
         &self,
         rays: &[PreciseRay],
@@ -146,8 +149,9 @@ impl PreciseScene {
         }
     }
 
-    /// All hits of each ray, by t and then by id: those of ray i are the `ends[i]` less the end before it, from there on in `hits`. What
-    /// counts is said at [`Bvh::all_hits`](super::super::bvh::Bvh::all_hits). Both are cleared first.
+    /// All hits of each ray, by t and then by id: those of ray i are the `ends[i]` less the end before it, from there
+    /// on in `hits`. What counts is said at [`Bvh::all_hits`](super::super::bvh::Bvh::all_hits). Both are cleared
+    /// first.
     pub fn all_hits_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, hits: &mut Vec<PreciseHit>) {
         ends.clear();
         hits.clear();
@@ -161,8 +165,9 @@ impl PreciseScene {
         }
     }
 
-    /// The geometry and the primitive of each hit of [`Self::all_hits_batch`], in the same order, without computing t, u and v of a ray whose hits lie so far apart
-    /// that they are in order without. (Where sizes squared times a direction vanish in f64, [`Self::all_hits_batch`] may miss what is named here.)
+    /// The geometry and the primitive of each hit of [`Self::all_hits_batch`], in the same order, without computing t,
+    /// u and v of a ray whose hits lie so far apart that they are in order without. (Where sizes squared times a
+    /// direction vanish in f64, [`Self::all_hits_batch`] may miss what is named here.)
     pub fn all_ids_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, names: &mut Vec<(u32, u32)>) {
         ends.clear();
         names.clear();
@@ -198,7 +203,8 @@ impl PreciseScene {
         }
     }
 
-    /// All hits of each ray of a chunk, but of those that `take` takes: it is told the ray, and what it hits for sure, with bounds on t, where there is nothing else.
+    /// All hits of each ray of a chunk, but of those that `take` takes: it is told the ray, and what it hits for sure,
+    /// with bounds on t, where there is nothing else.
     fn all_of_chunk(
         &self,
         rays: &[PreciseRay],
@@ -288,7 +294,8 @@ impl PreciseScene {
         hit_of(ray, &self.corners(geometry, primitive), geometry, primitive)
     }
 
-    /// Offers every triangle that the ray may hit, as [`Bvh::candidates`](super::super::bvh::Bvh) does; all of them where the ray is lost in the frame.
+    /// Offers every triangle that the ray may hit, as [`Bvh::candidates`](super::super::bvh::Bvh) does; all of them
+    /// where the ray is lost in the frame.
     fn candidates(&self, local: &LocalRay, offer: &mut dyn FnMut(u32, u32) -> Option<f32>) {
         if !local.is_lost {
             return self.bvh.candidates(&local.ray, local.blur, offer);
@@ -351,8 +358,8 @@ impl PreciseScene {
 
 /// Rays of a chunk, and triangles that they hit for sure or may hit.
 ///
-/// Corners are looked up for all of them at once, one step of the way at a time: the processor then waits for many cache lines together,
-/// where pair by pair it would wait for each.
+/// Corners are looked up for all of them at once, one step of the way at a time: the processor then waits for many
+/// cache lines together, where pair by pair it would wait for each.
 #[derive(Default)]
 struct Pairs {
     /// Ray, block and lane, and whether the ray hits for sure.

@@ -1,11 +1,13 @@
 //! Triangles that a mesh holds twice.
 //!
-//! Faces that were exported twice, or merged from two copies, have the same corners in the same winding. A ray that crosses one crosses the other
-//! at the same place and in the same sense, so that what is crossed once is counted twice, and the inside of a closed mesh is its outside. So whoever counts asks
-//! a tree without the later ones. (A copy with the other winding stays: two closed bodies that touch face to face have both.)
+//! Faces that were exported twice, or merged from two copies, have the same corners in the same winding. A ray that
+//! crosses one crosses the other at the same place and in the same sense, so that what is crossed once is counted
+//! twice, and the inside of a closed mesh is its outside. So whoever counts asks a tree without the later ones. (A copy
+//! with the other winding stays: two closed bodies that touch face to face have both.)
 //!
-//! Repeats are looked for among 64-bit hashes of corners, sorted: two million take 16 MB for as long as that lasts, a tenth of a second on two threads. Only where two are the
-//! same are the triangles themselves compared. A table of all triangles, the simpler alternative, takes several times both.
+//! Repeats are looked for among 64-bit hashes of corners, sorted: two million take 16 MB for as long as that lasts, a
+//! tenth of a second on two threads. Only where two are the same are the triangles themselves compared. A table of all
+//! triangles, the simpler alternative, takes several times both.
 
 use std::collections::HashSet;
 
@@ -22,8 +24,9 @@ const TOGETHER: usize = 4096;
 type Key = [[u64; 3]; 3];
 
 impl PreciseScene {
-    /// The same without triangles that repeat an earlier one of their mesh, with the same corners in the same winding, for whoever counts: these are never hit there. All others keep
-    /// their numbers. Found out when it is first asked, on rayon's current thread pool; a second tree, where there are any.
+    /// The same without triangles that repeat an earlier one of their mesh, with the same corners in the same winding,
+    /// for whoever counts: these are never hit there. All others keep their numbers. Found out when it is first asked,
+    /// on rayon's current thread pool; a second tree, where there are any.
     pub fn distinct(&self) -> &Self {
         made_outside(&self.distinct, || {
             let meshes = without_repeats(&self.meshes)?;
@@ -53,7 +56,8 @@ fn without(mesh: &PreciseMesh, repeats: &[u32]) -> PreciseMesh {
     if repeats.is_empty() {
         return mesh;
     }
-    // Such a corner leaves triangles out of the tree. Where no number is left for it, what has no area is not hit either.
+    // Such a corner leaves triangles out of the tree. Where no number is left for it, what has no area is not hit
+    // either.
     let nowhere = u32::try_from(mesh.positions.len()).unwrap_or(0);
     mesh.positions.push(DVec3::NAN);
     repeats.iter().for_each(|&i| mesh.triangles[i as usize] = [nowhere; 3]);
@@ -97,7 +101,8 @@ fn hash(mesh: &PreciseMesh, triangle: [u32; 3]) -> u64 {
     if is_flat || !triangle.iter().all(|&i| is_traceable(mesh.positions[i as usize])) {
         return NEVER;
     }
-    // Of the numbers' differences, which are many bits apart, a multiplication takes care, and of their order the rotation.
+    // Of the numbers' differences, which are many bits apart, a multiplication takes care, and of their order the
+    // rotation.
     let mix = |hash: u64, bits: &u64| {
         let mixed = (hash.rotate_left(29) ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         mixed ^ mixed >> 32

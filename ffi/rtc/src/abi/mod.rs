@@ -1,7 +1,7 @@
 //! Embree's C structures and numbers, as far as both sides of the boundary look into them.
 //!
-//! Written by hand from the public interface (embree3/rtcore.h of 3.13, embree4/rtcore.h of 4.3), so that the crate builds where no Embree is
-//! installed; sizes and offsets are asserted below each structure.
+//! Written by hand from the public interface (embree3/rtcore.h of 3.13, embree4/rtcore.h of 4.3), so that the crate
+//! builds where no Embree is installed; sizes and offsets are asserted below each structure.
 
 mod call;
 mod enums;

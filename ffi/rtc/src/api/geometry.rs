@@ -116,7 +116,8 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryMask(geometry: *const Geometry, ma
     }
 }
 
-/// Heeded in scenes that are dynamic: to refit, and low, where the scene's own quality is medium and all geometries of a tree ask for it.
+/// Heeded in scenes that are dynamic: to refit, and low, where the scene's own quality is medium and all geometries of
+/// a tree ask for it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
     let set = |state: &mut State| {
@@ -130,7 +131,8 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryBuildQuality(geometry: *const Geom
     unsafe { modify(geometry, set) }
 }
 
-/// Curves of a minimal width on the screen are not built in, as in both Debians' Embree, which say so: programs ask by this whether they are.
+/// Curves of a minimal width on the screen are not built in, as in both Debians' Embree, which say so: programs ask by
+/// this whether they are.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry, _scale: f32) {
     // SAFETY: the interface's rules.

@@ -47,7 +47,8 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryTransform(
         present(matrix.cast_mut())?;
         let words = transform_words(format).filter(|_| format != format::QUATERNION_DECOMPOSITION);
         let words = words.ok_or_else(|| Failure::operation("invalid matrix format"))?;
-        // SAFETY: as many floats as the format has, by the interface's rules; they may be unaligned for all that is known.
+        // SAFETY: as many floats as the format has, by the interface's rules; they may be unaligned for all that is
+        // known.
         let floats: Vec<f32> = (0..words).map(|i| unsafe { matrix.cast::<f32>().add(i).read_unaligned() }).collect();
         geometry.set_transform(step, Transform::Matrix(read_transform(format, &floats)?))
     };

@@ -1,8 +1,9 @@
 //! The exported functions: checks of handles, and calls of what does the work.
 //!
-//! What is safe about all of them is what the interface says: handles are null or alive, callbacks are of the type that is asked for, pointers
-//! name what the structures say, scenes are not changed or committed while rays are traced in them, and an object is changed by one thread at a time.
-//! The comments below refer to these as the interface's rules; nothing here can check more than whether a pointer is null.
+//! What is safe about all of them is what the interface says: handles are null or alive, callbacks are of the type that
+//! is asked for, pointers name what the structures say, scenes are not changed or committed while rays are traced in
+//! them, and an object is changed by one thread at a time. The comments below refer to these as the interface's rules;
+//! nothing here can check more than whether a pointer is null.
 
 mod builder;
 mod device;

@@ -97,8 +97,8 @@ packets! {
     rtcOccluded16 16 occluded_lanes
 }
 
-/// Sends the ray of a callback on into a scene, from another place, as if that were an instance. Callbacks of this library are given one ray
-/// at a time, so packets are refused.
+/// Sends the ray of a callback on into a scene, from another place, as if that were an instance. Callbacks of this
+/// library are given one ray at a time, so packets are refused.
 ///
 /// # Safety
 /// As for the functions of the interface.

@@ -11,8 +11,8 @@ use crate::failure::{Failure, Result};
 const MAX_VERTEX_BYTES: usize = 16 << 30;
 
 impl Geometry {
-    /// Sets a buffer. What was committed stands until scenes are made anew: unlike other changes, this one needs no commit for that, as in Embree, while there are
-    /// as many primitives as before.
+    /// Sets a buffer. What was committed stands until scenes are made anew: unlike other changes, this one needs no
+    /// commit for that, as in Embree, while there are as many primitives as before.
     pub fn set_buffer(&self, name: (u32, u32), buffer: Arc<Buffer>, items: Items) -> Result<()> {
         self.check(name, &items, buffer.data() as usize)?;
         let view = View::new(buffer, items)?;
@@ -56,7 +56,8 @@ impl Geometry {
         self.modify(|state| if has_buffers { slot(self.kind, state, name).map(|_| ()) } else { Ok(()) })
     }
 
-    /// Whether the geometry takes such a buffer, which begins at an address; looked at in Embree's order, which decides what is told.
+    /// Whether the geometry takes such a buffer, which begins at an address; looked at in Embree's order, which decides
+    /// what is told.
     fn check(&self, name: (u32, u32), items: &Items, address: usize) -> Result<()> {
         if items.count > u32::MAX as usize {
             return Err(Failure::argument("buffer too large"));

@@ -70,7 +70,8 @@ fn component(view: &View, vertex: u32, k: usize) -> Option<f32> {
         return None;
     }
     let at = view.data().wrapping_add(vertex as usize * view.stride() + 4 * k);
-    // SAFETY: callers may ask for as many components as are in the buffer, which is theirs to know; the interface has no other rule.
+    // SAFETY: callers may ask for as many components as are in the buffer, which is theirs to know; the interface has
+    // no other rule.
     Some(unsafe { at.cast::<f32>().read_unaligned() })
 }
 

@@ -1,7 +1,7 @@
 //! Geometry as the caller describes it.
 //!
-//! Everything is behind one lock, and read once when a scene is committed; but the user pointer, which callers change at any
-//! time, is given to callbacks as it is at that moment.
+//! Everything is behind one lock, and read once when a scene is committed; but the user pointer, which callers change
+//! at any time, is given to callbacks as it is at that moment.
 
 mod buffers;
 mod interpolate;
@@ -38,8 +38,8 @@ pub enum Kind {
     User,
     Instance,
     InstanceArray,
-    /// What this library does not have: it takes everything and is never hit. Its making is an error, but programs that do not ask for
-    /// errors write to its buffers all the same.
+    /// What this library does not have: it takes everything and is never hit. Its making is an error, but programs that
+    /// do not ask for errors write to its buffers all the same.
     Absent,
 }
 
@@ -67,7 +67,8 @@ impl Kind {
         })
     }
 
-    /// The buffer that says how many primitives there are, by type and slot; of what has none, a name that no buffer has.
+    /// The buffer that says how many primitives there are, by type and slot; of what has none, a name that no buffer
+    /// has.
     fn primitives(self) -> (u32, u32) {
         match self {
             Self::Triangles | Self::Quads | Self::Linear(Shape::RoundCurve) => (buffer_type::INDEX, 0),
@@ -113,7 +114,8 @@ pub struct State {
     pub flags: Option<View>,
     pub grids: Option<View>,
     pub time_range: (f32, f32),
-    /// How many were set: those of a scene that is made for another reason are read, whether the geometry was committed or not.
+    /// How many were set: those of a scene that is made for another reason are read, whether the geometry was committed
+    /// or not.
     pub buffers: u64,
     pub quality: u32,
     pub mask: u32,
@@ -145,7 +147,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Of a kind by its number. A kind that this library does not have is [`Kind::Absent`], and what is to be told of it comes with the geometry.
+    /// Of a kind by its number. A kind that this library does not have is [`Kind::Absent`], and what is to be told of
+    /// it comes with the geometry.
     ///
     /// # Errors
     /// Where there is no such kind in Embree.

@@ -7,8 +7,8 @@ use smallvec::SmallVec;
 /// One a time step, of which there is mostly one alone.
 pub type PerStep<T> = SmallVec<[T; 1]>;
 
-/// What is there at equally distant times of a range, of which the first and the last are its ends; at least one. What has one alone stands still, and is
-/// there at all times.
+/// What is there at equally distant times of a range, of which the first and the last are its ends; at least one. What
+/// has one alone stands still, and is there at all times.
 #[derive(Clone, Debug)]
 pub struct TimeSteps<T> {
     steps: PerStep<T>,
@@ -30,7 +30,8 @@ impl<T> TimeSteps<T> {
         self.len() == 1
     }
 
-    /// Whether it is there at a time at all. At the end of its range what follows on it is, unless that is the end of all time, 1.
+    /// Whether it is there at a time at all. At the end of its range what follows on it is, unless that is the end of
+    /// all time, 1.
     #[inline]
     pub fn is_at(&self, time: f32) -> bool {
         let (begin, end) = self.range;
@@ -51,7 +52,8 @@ impl<T> Deref for TimeSteps<T> {
     }
 }
 
-/// The step before a time, and, of what moves, the next one and how far it is to that; outside of the range those at that end.
+/// The step before a time, and, of what moves, the next one and how far it is to that; outside of the range those at
+/// that end.
 #[inline]
 pub fn around<T>(steps: &[T], (begin, end): (f32, f32), time: f32) -> (&T, Option<(&T, f32)>) {
     if let [only] = steps {

@@ -1,7 +1,7 @@
 //! Triangles, quads and grids, all as triangles; and what a hit with one of these is in terms of the geometry.
 //!
-//! A quad v0 v1 v2 v3 is the triangles (v0, v1, v3) and (v2, v3, v1), of which the second counts u and v from the other end; a
-//! grid is a quad a cell. So watertightness and exactness are those of triangles.
+//! A quad v0 v1 v2 v3 is the triangles (v0, v1, v3) and (v2, v3, v1), of which the second counts u and v from the other
+//! end; a grid is a quad a cell. So watertightness and exactness are those of triangles.
 
 use std::sync::Arc;
 

@@ -77,8 +77,8 @@ fn quaternion(parts: &RTCQuaternionDecomposition) -> DQuat {
     DQuat::from_xyzw(i, j, k, r).normalize()
 }
 
-/// Between two of them: rotations along the great circle (Shoemake 1985, *Animating rotation with quaternion curves*), all else
-/// linearly.
+/// Between two of them: rotations along the great circle (Shoemake 1985, *Animating rotation with quaternion curves*),
+/// all else linearly.
 fn between(a: &RTCQuaternionDecomposition, b: &RTCQuaternionDecomposition, at: f32) -> Affine3 {
     let mix = |a: [f32; 3], b: [f32; 3]| Vec3::from(a).lerp(Vec3::from(b), at).to_array();
     let turned = quaternion(a).slerp(quaternion(b), f64::from(at)).as_quat();
@@ -114,8 +114,9 @@ impl Motion {
         after.map_or_else(|| before.matrix(), |(after, fraction)| mix(before, after, fraction))
     }
 
-    /// Times from 0 to 1 and where it is then, between which everything moves in straight lines, or nearly: by how much points within
-    /// `reach` of the origin may stray from these lines. None where it is not there in that time. Of what moves.
+    /// Times from 0 to 1 and where it is then, between which everything moves in straight lines, or nearly: by how much
+    /// points within `reach` of the origin may stray from these lines. None where it is not there in that time. Of what
+    /// moves.
     pub fn places(&self, reach: f32) -> (Vec<(f32, Affine3)>, f32) {
         let (begin, end) = self.range();
         let (first, last) = (begin.max(0.0), end.min(1.0));
@@ -158,8 +159,8 @@ fn mix(a: &Transform, b: &Transform, fraction: f32) -> Affine3 {
 
 /// By how much a point within `reach` may stray from the line between two neighbouring places of a turn.
 ///
-/// An eighth of the square of the step times the most that its acceleration may be: it turns by half a turn at most, while the arm that is turned
-/// changes evenly.
+/// An eighth of the square of the step times the most that its acceleration may be: it turns by half a turn at most,
+/// while the arm that is turned changes evenly.
 fn sagitta(a: &RTCQuaternionDecomposition, b: &RTCQuaternionDecomposition, reach: f32) -> f32 {
     const TURN: f32 = std::f32::consts::PI;
     let length = |parts: &RTCQuaternionDecomposition, from: &RTCQuaternionDecomposition| {

@@ -5,7 +5,8 @@ use twincast_core::math::{Aabb, Affine3, Vec3};
 use super::committed::{Body, Instance, Item, Record};
 use super::path;
 
-/// Boxes of the second tree, each between two places, and what is in them; and those of everything at both ends of time.
+/// Boxes of the second tree, each between two places, and what is in them; and those of everything at both ends of
+/// time.
 #[derive(Default)]
 pub struct Boxes {
     pub items: Vec<Item>,
@@ -42,8 +43,9 @@ impl Boxes {
 
     /// Adds what is within `whole` at all times of its range and, from time 0 to 1, between `ends`.
     fn put(&mut self, item: Item, whole: Aabb, ends: [Aabb; 2], (begin, end): (f32, f32)) {
-        // What leads to and fro has ends that may be wider than the whole. In units of 2^-24 of the largest coordinate, a position between two steps is off by 3, by 8
-        // for where between them it is, by as many for when these are, and the line and its distance from it by 8: less than 34 together.
+        // What leads to and fro has ends that may be wider than the whole. In units of 2^-24 of the largest coordinate,
+        // a position between two steps is off by 3, by 8 for where between them it is, by as many for when these are,
+        // and the line and its distance from it by 8: less than 34 together.
         let reach = whole.min.abs().max(whole.max.abs()) * 2e-6;
         let ends = ends.map(|bounds| Aabb { min: bounds.min - reach, max: bounds.max + reach });
         let is_narrower = ends[0].half_area() + ends[1].half_area() < 1.9 * whole.half_area();
@@ -119,11 +121,11 @@ pub fn instance_bounds(instance: &Instance) -> (Aabb, [Aabb; 2]) {
     (whole, path::linear(knots.into_iter()))
 }
 
-/// Two boxes between which what is inside always is while it moves from the first of its boxes to the second and its place from the first
-/// transform to the second, both in straight lines.
+/// Two boxes between which what is inside always is while it moves from the first of its boxes to the second and its
+/// place from the first transform to the second, both in straight lines.
 ///
-/// The product is quadratic in time, with the control boxes M0 B0, (M0 B1 + M1 B0) / 2 and M1 B1. It strays from the line between the outer ones
-/// by 2 t (1 - t) of what the middle one does from their mean, so at most by half of that.
+/// The product is quadratic in time, with the control boxes M0 B0, (M0 B1 + M1 B0) / 2 and M1 B1. It strays from the
+/// line between the outer ones by 2 t (1 - t) of what the middle one does from their mean, so at most by half of that.
 fn product([from, to]: [&Affine3; 2], [start, end]: [Aabb; 2], reach: Vec3, stray: f32) -> [Aabb; 2] {
     let [first, last] = [placed(from, start, reach), placed(to, end, reach)];
     let [a, b] = [placed(from, end, reach), placed(to, start, reach)];

@@ -117,7 +117,8 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         near: std::sync::OnceLock::new(),
         bytes,
     };
-    // What was announced is corrected, so that takings and givings back add up. What was kept is the old scene's, unless this one takes its place.
+    // What was announced is corrected, so that takings and givings back add up. What was kept is the old scene's,
+    // unless this one takes its place.
     let more = bytes as isize - kept as isize;
     _ = scene.device.account(more - expected as isize, true);
     progress.at(1.0).inspect_err(|_| _ = scene.device.account(-more, true))?;
@@ -160,7 +161,8 @@ fn balls(records: &[Option<Box<Record>>], items: &[Item]) -> Vec<Ball> {
     items.iter().map(ball).collect::<Option<_>>().unwrap_or_default()
 }
 
-/// Whether what was read of a geometry's buffers is what would be read now. The caller's own boxes are asked for anew, and instances are where their scenes are now.
+/// Whether what was read of a geometry's buffers is what would be read now. The caller's own boxes are asked for anew,
+/// and instances are where their scenes are now.
 fn is_same(before: &Record, geometry: &Arc<Geometry>) -> bool {
     let is_read = matches!(before.body, Body::Surface(_) | Body::Linear(_));
     let is_as_before = |state: &geometry::State| {

@@ -1,4 +1,5 @@
-//! A committed scene: what rays are traced in. It does not change; of a scene that is dynamic the next commit takes it apart.
+//! A committed scene: what rays are traced in. It does not change; of a scene that is dynamic the next commit takes it
+//! apart.
 
 use std::sync::{Arc, OnceLock};
 
@@ -81,7 +82,8 @@ impl Item {
     }
 }
 
-/// All that a ray needs of an instance that stands still to go on in its scene, in one place: by way of its record it would wait for memory four times.
+/// All that a ray needs of an instance that stands still to go on in its scene, in one place: by way of its record it
+/// would wait for memory four times.
 #[repr(align(64))]
 pub struct Placed {
     pub to_scene: DAffine3,
@@ -118,7 +120,8 @@ pub struct Committed {
     pub records: Vec<Option<Box<Record>>>,
     /// The largest tree over triangles that stand still; none where there are none.
     pub solid: Option<Solid>,
-    /// The other ones, of a scene that is dynamic and has changed since the first commit; none larger than the one before it.
+    /// The other ones, of a scene that is dynamic and has changed since the first commit; none larger than the one
+    /// before it.
     pub smaller: Vec<Solid>,
     /// Whether each triangle of all these is a primitive.
     pub is_plain: bool,
@@ -137,9 +140,11 @@ pub struct Committed {
     pub made_with: (u32, Preset),
     /// At time 0 and at time 1.
     pub bounds: [Aabb; 2],
-    /// Whether a triangle does not count where a ray begins: at `tnear` itself Embree finds one only in scenes that are robust.
+    /// Whether a triangle does not count where a ray begins: at `tnear` itself Embree finds one only in scenes that are
+    /// robust.
     pub excludes_start: bool,
-    /// Boxes of primitives that point queries show and no tree over triangles names, made when the first point query asks for them.
+    /// Boxes of primitives that point queries show and no tree over triangles names, made when the first point query
+    /// asks for them.
     pub near: OnceLock<Near>,
     /// Memory that was accounted for.
     pub bytes: usize,
@@ -184,7 +189,8 @@ impl Committed {
         self.solid.take().into_iter().chain(self.smaller.drain(..)).collect()
     }
 
-    /// All that is no triangle of its own, where that is instances that stand still, in the order of [`Committed::others`].
+    /// All that is no triangle of its own, where that is instances that stand still, in the order of
+    /// [`Committed::others`].
     #[inline(always)]
     pub fn only_placed(&self) -> Option<&[Placed]> {
         (self.placed.len() == self.items.len()).then_some(&self.placed[..])

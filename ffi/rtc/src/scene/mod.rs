@@ -66,7 +66,8 @@ impl Scene {
     /// What rays are traced in, after the first commit.
     ///
     /// # Safety
-    /// The scene is not committed again while the result is used: that queries and commits do not meet is the interface's rule.
+    /// The scene is not committed again while the result is used: that queries and commits do not meet is the
+    /// interface's rule.
     #[inline(always)]
     pub unsafe fn committed(&self) -> Option<&Committed> {
         // SAFETY: it is null, or a box that `replace` made and only `replace` and `drop` free.
@@ -175,7 +176,8 @@ impl Scene {
         self.state().progress = Callback { function, user };
     }
 
-    /// Makes what is set the scene that rays are traced in. Several threads may call it at the same time: one works, the others wait.
+    /// Makes what is set the scene that rays are traced in. Several threads may call it at the same time: one works,
+    /// the others wait.
     pub fn commit(&self) -> Result<()> {
         let _turn = self.committing.lock().unwrap_or_else(PoisonError::into_inner);
         let (made_of, plan) = {
@@ -186,7 +188,8 @@ impl Scene {
             }
             (made_of, commit::Plan::new(&state))
         };
-        // Taken out first, for the new one is made of its parts: meanwhile there is nothing to trace rays in, which nobody may do while a scene is committed.
+        // Taken out first, for the new one is made of its parts: meanwhile there is nothing to trace rays in, which
+        // nobody may do while a scene is committed.
         let mut old = if plan.is_dynamic() { self.replace(None) } else { None };
         let result = commit::commit(self, &plan, old.as_deref_mut());
         let (committed, result) = match result {

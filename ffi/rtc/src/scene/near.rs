@@ -1,8 +1,9 @@
 //! Boxes of the primitives that point queries show, all but points and curves, where the trees of rays do not do.
 //!
-//! A query shows the caller each primitive near a point, triangles too. The trees of triangles know triangles, but not quads, nor what stands
-//! beside them; scenes that are asked for points are few, and get one more tree over such boxes then. It holds what moves by where it ever is;
-//! whether it is near at the time of the query is looked at before the caller is shown it.
+//! A query shows the caller each primitive near a point, triangles too. The trees of triangles know triangles, but not
+//! quads, nor what stands beside them; scenes that are asked for points are few, and get one more tree over such boxes
+//! then. It holds what moves by where it ever is; whether it is near at the time of the query is looked at before the
+//! caller is shown it.
 
 use twincast_core::math::{Aabb, Vec3};
 use twincast_core::trace::bvh::{BoxTree, Options, VisitFlow};

@@ -32,7 +32,8 @@ pub fn ends(steps: &[Aabb], range: (f32, f32)) -> [Aabb; 2] {
     linear(first.chain(inner).chain(last))
 }
 
-/// Boxes at time 0 and at time 1 between which are those that move in straight lines from each of these times to the next.
+/// Boxes at time 0 and at time 1 between which are those that move in straight lines from each of these times to the
+/// next.
 pub fn linear(knots: impl Iterator<Item = (f32, Aabb)> + Clone) -> [Aabb; 2] {
     let (Some((_, a)), Some((_, b))) = (knots.clone().next(), knots.clone().last()) else {
         return [Aabb::EMPTY; 2];

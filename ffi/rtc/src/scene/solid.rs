@@ -1,8 +1,9 @@
 //! Trees over the triangles that stand still.
 //!
-//! A scene has one. A scene that is dynamic has more once something in it has changed: a commit takes what changed out of the trees it was in, builds one over that, and keeps
-//! the others. What has come to rest is merged with what is not much larger, as in a log-structured merge tree (O'Neil, Cheng, Gawlick, O'Neil 1996), so that there are few trees, and
-//! what rests is built again a few times at most.
+//! A scene has one. A scene that is dynamic has more once something in it has changed: a commit takes what changed out
+//! of the trees it was in, builds one over that, and keeps the others. What has come to rest is merged with what is not
+//! much larger, as in a log-structured merge tree (O'Neil, Cheng, Gawlick, O'Neil 1996), so that there are few trees,
+//! and what rests is built again a few times at most.
 
 use std::sync::Arc;
 
@@ -14,7 +15,8 @@ use twincast_core::trace::{Part, Primitives};
 use super::committed::{Body, Record};
 use crate::abi::quality;
 
-/// What is at rest is merged with the next larger tree unless that has more than so many times its triangles. Each tree costs every ray some 30 ns.
+/// What is at rest is merged with the next larger tree unless that has more than so many times its triangles. Each tree
+/// costs every ray some 30 ns.
 const MERGED: usize = 4;
 
 /// Trees that are refitted by themselves, at most.
@@ -48,7 +50,8 @@ struct Member {
 pub enum Making {
     /// It is as it was, but for what was taken out.
     Kept(Solid),
-    /// Vertices have moved, and the geometries ask for no more than that boxes follow. What it is built with where that is not enough.
+    /// Vertices have moved, and the geometries ask for no more than that boxes follow. What it is built with where that
+    /// is not enough.
     Refitted(Solid, Preset),
     /// Over these geometries, by rising id, which have so many triangles.
     Built(Vec<u32>, usize, Preset),
@@ -66,7 +69,8 @@ pub struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// How the trees are made, the largest first. `old` are those of the last commit; none where they are not to be looked at.
+    /// How the trees are made, the largest first. `old` are those of the last commit; none where they are not to be
+    /// looked at.
     pub fn plan(&self, old: Vec<Solid>) -> Vec<Making> {
         let all = (0..self.records.len() as u32).filter(|&id| still_triangles(self.records, id) > 0);
         let mut changed: Vec<u32> = all.filter(|&id| !old.iter().any(|solid| solid.has(id))).collect();
@@ -241,7 +245,8 @@ impl Solid {
         self.members.iter().map(|member| member.triangles).sum()
     }
 
-    /// Takes some members out, unless more would be gone then than left, or it cannot: whether it did. If not, this is good for nothing but to be built anew.
+    /// Takes some members out, unless more would be gone then than left, or it cannot: whether it did. If not, this is
+    /// good for nothing but to be built anew.
     fn take_out(&mut self, members: &[Member]) -> bool {
         let leaving = members.iter().map(|member| member.triangles).sum::<usize>();
         if self.gone + leaving > self.triangles() - leaving {

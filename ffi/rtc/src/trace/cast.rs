@@ -47,7 +47,8 @@ pub fn sight(committed: &Committed, query: &Query, mask: u32, any: bool) -> Sigh
     let has_filter = if any { heeded.occluded_filter } else { heeded.intersect_filter };
     match heeded.mask {
         Some(own) if own & mask == 0 => Sight::Nothing,
-        // A filter that comes with the query is run whether the scene was told to expect one or not, as in Embree by single rays.
+        // A filter that comes with the query is run whether the scene was told to expect one or not, as in Embree by
+        // single rays.
         Some(_) if !(has_filter || query.filter.is_some()) => Sight::Everything,
         _ => Sight::Some,
     }
@@ -59,8 +60,8 @@ pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &
     cast_after::<ANY>(committed, query, target, INVALID_ID);
 }
 
-/// The same where geometry `nearest` has been hit before: at the same distance the lower one is, here and below. The one that has been hit now;
-/// [`INVALID_ID`] stands for none, before and after.
+/// The same where geometry `nearest` has been hit before: at the same distance the lower one is, here and below. The
+/// one that has been hit now; [`INVALID_ID`] stands for none, before and after.
 #[inline(always)]
 fn cast_after<const ANY: bool>(committed: &Committed, query: &Query, target: &Target, mut nearest: u32) -> u32 {
     let sight = sight(committed, query, target.mask(), ANY);
@@ -86,8 +87,8 @@ pub fn cast_inside<const ANY: bool>(committed: &Committed, query: &Query, target
     cast_after::<ANY>(committed, query, target, nearest)
 }
 
-/// Among the triangles of all trees but the largest, the smallest first, for what is behind need not be looked at then. By value, here and
-/// below, so that neither need lie in memory where there is nothing of that.
+/// Among the triangles of all trees but the largest, the smallest first, for what is behind need not be looked at then.
+/// By value, here and below, so that neither need lie in memory where there is nothing of that.
 #[inline(never)]
 fn cast_smaller<const ANY: bool>(
     committed: &Committed,
@@ -355,7 +356,8 @@ fn enter_at<const ANY: bool>(
     let Some(committed) = (unsafe { scene.committed() }) else { return };
     let [org, dir] = [ray.org, ray.dir].map(|v| DVec3::from(v.map(f64::from)));
     let (org, dir) = (to_scene.transform_point3(org).as_vec3(), to_scene.transform_vector3(dir).as_vec3());
-    // At the distance of the hit so far everything in here is, or nothing: as if none had been hit, or the lowest that can be.
+    // At the distance of the hit so far everything in here is, or nothing: as if none had been hit, or the lowest that
+    // can be.
     let before = if *nearest <= own { 0 } else { INVALID_ID };
     let tfar = target.tfar();
     let mut now = before;

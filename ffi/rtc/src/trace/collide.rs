@@ -19,11 +19,13 @@ const TASK: usize = 1 << 6;
 /// Collisions that are there at the same time, about.
 const WAVE: usize = 1 << 18;
 
-/// Tells of each pair of user primitives, one of each scene, whose boxes overlap at their first time steps; in a scene with itself no primitive meets itself. They are looked for by the
-/// device's threads, and told by the caller's own, always in the same order.
+/// Tells of each pair of user primitives, one of each scene, whose boxes overlap at their first time steps; in a scene
+/// with itself no primitive meets itself. They are looked for by the device's threads, and told by the caller's own,
+/// always in the same order.
 ///
 /// # Errors
-/// Where there is other geometry: its boxes would have to be those of the primitives that the caller knows, which only user geometry has.
+/// Where there is other geometry: its boxes would have to be those of the primitives that the caller knows, which only
+/// user geometry has.
 pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, user: *mut c_void) -> Result<()> {
     let function = function.ok_or_else(|| Failure::argument("invalid argument"))?;
     let is_user = |scene: &Committed| {

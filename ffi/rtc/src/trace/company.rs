@@ -1,4 +1,5 @@
-//! Several rays at a time among instances that stand still: as long as they go the same way, they go from one scene into the next together.
+//! Several rays at a time among instances that stand still: as long as they go the same way, they go from one scene
+//! into the next together.
 
 use twincast_core::math::Vec3;
 use twincast_core::trace::bvh::{Asked, BoxTree, Bvh, Packet, PacketHits};
@@ -66,7 +67,8 @@ pub fn closest(
     let mut company = Company::new(query, lanes, first, packet, asked);
     if let Some(solid) = &committed.solid {
         let seeing = company.seeing(asked, crowd.mask);
-        // Not seen afterwards, as where there are triangles alone: what then traces the ray anew would trace it through the instances, too.
+        // Not seen afterwards, as where there are triangles alone: what then traces the ray anew would trace it through
+        // the instances, too.
         let beyond = beyond_start(packet, committed.excludes_start);
         let triangles = Asked { packets: [beyond.as_ref().unwrap_or(packet)], lanes: [seeing] };
         solid.bvh.closest_packets(&triangles, |[hits]| {

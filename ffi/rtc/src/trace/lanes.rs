@@ -24,8 +24,9 @@ impl Words for RTCRayHit {
 /// Rays of the caller's, by number; those words of all rays that are the same lie side by side.
 ///
 /// # Safety
-/// As long as the lanes are there, [`word`](Lanes::word) is where this thread can read each of [`Record`](Lanes::Record)'s words of each of
-/// [`count`](Lanes::count) rays, those of eight in a row side by side, and write to those that answer, which are [`field::TFAR`] and the words of hits.
+/// As long as the lanes are there, [`word`](Lanes::word) is where this thread can read each of
+/// [`Record`](Lanes::Record)'s words of each of [`count`](Lanes::count) rays, those of eight in a row side by side, and
+/// write to those that answer, which are [`field::TFAR`] and the words of hits.
 pub unsafe trait Lanes {
     /// A ray, or a ray and its hit.
     type Record: Words;
@@ -67,7 +68,8 @@ pub unsafe trait Lanes {
     #[inline(always)]
     fn set_row<const N: usize>(&self, word: usize, first: usize, values: [u32; N]) {
         assert!(self.has::<N>(word, first) && (word == field::TFAR || word >= RAY_WORDS));
-        // SAFETY: they are there and answer, and who implements this promises that they can be written to, and lie side by side.
+        // SAFETY: they are there and answer, and who implements this promises that they can be written to, and lie side
+        // by side.
         unsafe { self.word(word, first).cast::<[u32; N]>().write(values) };
     }
 
@@ -111,7 +113,8 @@ pub unsafe trait Lanes {
         let mut hit = RTCHit::NONE;
         let words = (&raw mut hit).cast::<u32>();
         for k in 0..HIT_WORDS {
-            // SAFETY: a hit begins with that many words; it is there, and who implements this promises that it can be read.
+            // SAFETY: a hit begins with that many words; it is there, and who implements this promises that it can be
+            // read.
             unsafe { words.add(k).write(self.word(RAY_WORDS + k, lane).read()) };
         }
         hit
@@ -161,7 +164,8 @@ pub struct Packed<T> {
 
 impl<T: Words> Packed<T> {
     /// # Safety
-    /// From `base` on there are `width` rays, with their hits where `T` has one; they are this thread's as long as the lanes are there.
+    /// From `base` on there are `width` rays, with their hits where `T` has one; they are this thread's as long as the
+    /// lanes are there.
     pub unsafe fn new(base: *mut u32, width: usize) -> Self {
         Self { base, width, record: PhantomData }
     }
@@ -184,7 +188,8 @@ unsafe impl<T: Words> Lanes for Packed<T> {
     #[inline(always)]
     unsafe fn packet(&self) -> Option<&Packet> {
         let packet = self.base.cast::<Packet>().cast_const();
-        // SAFETY: who made the lanes promised that there are eight rays, which begin with one of these, and the caller that nobody writes to them.
+        // SAFETY: who made the lanes promised that there are eight rays, which begin with one of these, and the caller
+        // that nobody writes to them.
         (self.width == Packet::RAYS && packet.is_aligned()).then(|| unsafe { &*packet })
     }
 }
@@ -203,7 +208,8 @@ pub struct Pointers<'a, T> {
 pub struct Spare {
     zero: [u32; 8],
     ones: [u32; 8],
-    /// Stands for tfar, ids, flags and hits: what is read is what was written last, at first 0. Written to through a shared reference.
+    /// Stands for tfar, ids, flags and hits: what is read is what was written last, at first 0. Written to through a
+    /// shared reference.
     sink: std::cell::UnsafeCell<[u32; 8]>,
 }
 
@@ -217,16 +223,16 @@ impl Spare {
 #[cfg(feature = "v3")]
 impl<'a, T: Words> Pointers<'a, T> {
     /// # Safety
-    /// `words` are pointers to arrays of the words of `count` rays, then of their hits where `T` has one, each null or that long; they are this thread's as
-    /// long as the lanes are there.
+    /// `words` are pointers to arrays of the words of `count` rays, then of their hits where `T` has one, each null or
+    /// that long; they are this thread's as long as the lanes are there.
     pub unsafe fn new(words: *const *mut u32, count: usize, spare: &'a Spare) -> Self {
         Self { words, count, spare, record: PhantomData }
     }
 }
 
 #[cfg(feature = "v3")]
-// SAFETY: who made the lanes promised that there are such arrays, which are this thread's; what stands for others is long enough for eight rays, wherever
-// they are, and what of it may be written to can be.
+// SAFETY: who made the lanes promised that there are such arrays, which are this thread's; what stands for others is
+// long enough for eight rays, wherever they are, and what of it may be written to can be.
 unsafe impl<T: Words> Lanes for Pointers<'_, T> {
     type Record = T;
 

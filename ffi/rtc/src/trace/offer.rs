@@ -27,7 +27,8 @@ pub struct Nearest {
 }
 
 impl Nearest {
-    /// Some primitive of a geometry that has no others among what is still looked at; nothing, if that is [`INVALID_ID`](crate::abi::INVALID_ID).
+    /// Some primitive of a geometry that has no others among what is still looked at; nothing, if that is
+    /// [`INVALID_ID`](crate::abi::INVALID_ID).
     pub const fn of(geometry: u32) -> Self {
         Self { geometry, primitive: 0 }
     }

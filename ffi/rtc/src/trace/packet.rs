@@ -1,7 +1,8 @@
 //! Several rays at a time.
 //!
-//! Among triangles of which each counts, they are asked together, eight or sixteen at a time, in the caller's own layout: rows of words are copied
-//! into a [`Packet`] and back. All else goes ray by ray, through a ray of our own: callbacks are given one ray at a time.
+//! Among triangles of which each counts, they are asked together, eight or sixteen at a time, in the caller's own
+//! layout: rows of words are copied into a [`Packet`] and back. All else goes ray by ray, through a ray of our own:
+//! callbacks are given one ray at a time.
 
 use twincast_core::Ray;
 use twincast_core::math::Vec3;
@@ -27,7 +28,8 @@ struct Called<'a, L, V> {
 }
 
 impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
-    /// Calls `two` and `one` with packets of rays, which ask for triangles with this mask and nothing else, and their first lane.
+    /// Calls `two` and `one` with packets of rays, which ask for triangles with this mask and nothing else, and their
+    /// first lane.
     #[inline(always)]
     fn each_packet(
         &self,
@@ -56,7 +58,8 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         }
     }
 
-    /// Calls `among` with each packet, its first lane and a bit for each of its rays that is asked for, for what is not triangles alone; `alone` where that is one ray.
+    /// Calls `among` with each packet, its first lane and a bit for each of its rays that is asked for, for what is not
+    /// triangles alone; `alone` where that is one ray.
     fn each_company(&self, alone: impl Fn(usize), among: impl Fn(&Packet, usize, u32)) {
         for first in (0..self.lanes.count()).step_by(RAYS) {
             let asked = self.seeing(first, u32::MAX);
@@ -143,8 +146,8 @@ fn packet_of(row: impl Fn(usize) -> [u32; RAYS], excludes_start: bool) -> Packet
     }
 }
 
-/// The triangles, where there is nothing else and no filter is run, and the mask with which rays must have a bit in common to see all of them; the
-/// others see none.
+/// The triangles, where there is nothing else and no filter is run, and the mask with which rays must have a bit in
+/// common to see all of them; the others see none.
 #[inline(always)]
 pub fn only_triangles<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a Bvh, u32)> {
     let mask = committed.heeded.mask?;
@@ -280,7 +283,8 @@ fn tell_beyond_start(
         .for_each(|lane| intersect_lane(committed, query, lanes, first + lane));
 }
 
-/// Writes the hits of the lanes in `open`, one by one: where some rays miss, and where triangles are parts of other primitives.
+/// Writes the hits of the lanes in `open`, one by one: where some rays miss, and where triangles are parts of other
+/// primitives.
 #[inline(always)]
 fn tell_some(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits, mut open: u32) {
     let PacketHits { t, u, v, normal: [nx, ny, nz], primitive, geometry, .. } = hits;

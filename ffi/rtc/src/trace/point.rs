@@ -121,7 +121,8 @@ impl Search1 {
             committed,
             &Space {
                 point: to_scene.transform_point3(point.as_dvec3()).as_vec3(),
-                // Similarities are so to a hundred-thousandth, of the squares of lengths; more than half as much along some axis, and what is rounded here.
+                // Similarities are so to a hundred-thousandth, of the squares of lengths; more than half as much along
+                // some axis, and what is rounded here.
                 stretch: (stretch * (1.0 + 2e-5)) as f32,
                 similarity: similarity as f32,
                 is_instance: true,

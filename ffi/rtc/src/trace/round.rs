@@ -1,8 +1,9 @@
 //! Points and round curves against a ray, in f64.
 //!
-//! A segment of a curve is two balls and the cone that touches both. A place counts as a hit if it is on the surface of one of these
-//! three and inside none of the others, nor inside the neighbours: so joints are smooth, and a curve that is seen through is hit twice,
-//! going in and coming out. (Han, Wald, Usher, Wu, Wang, Pascucci, Hansen, Johnson 2019, *Ray tracing generalized tube primitives*.)
+//! A segment of a curve is two balls and the cone that touches both. A place counts as a hit if it is on the surface of
+//! one of these three and inside none of the others, nor inside the neighbours: so joints are smooth, and a curve that
+//! is seen through is hit twice, going in and coming out. (Han, Wald, Usher, Wu, Wang, Pascucci, Hansen, Johnson
+//! 2019, *Ray tracing generalized tube primitives*.)
 
 use twincast_core::Ray;
 use twincast_core::math::{DVec3, Vec3};

@@ -34,8 +34,8 @@ pub fn cast<const ANY: bool>(query: &Query, target: &Target, record: &Record, it
         record,
         query,
     };
-    // SAFETY: the caller promised a function of this type. The ray is the caller's own, followed by its hit where it has one; all
-    // else lives until the function returns.
+    // SAFETY: the caller promised a function of this type. The ray is the caller's own, followed by its hit where it
+    // has one; all else lives until the function returns.
     unsafe { function((&raw const call).cast()) };
 }
 

@@ -1,7 +1,9 @@
-//! Elements of any size: byte by byte as differences from the element before, in groups of 16 that have as many bits as they need.
+//! Elements of any size: byte by byte as differences from the element before, in groups of 16 that have as many bits as
+//! they need.
 //!
-//! The first version of the stream has differences of bytes alone, and what `KHR_meshopt_compression` adds is the second: four bytes at a time are a
-//! [channel](Channel), of which differences may be wider; and each byte's groups have a choice of widths of its own.
+//! The first version of the stream has differences of bytes alone, and what `KHR_meshopt_compression` adds is the
+//! second: four bytes at a time are a [channel](Channel), of which differences may be wider; and each byte's groups
+//! have a choice of widths of its own.
 
 use super::stream::{Stream, zigzag};
 use crate::io::Placeless;

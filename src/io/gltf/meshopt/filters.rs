@@ -2,8 +2,8 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
-/// Unit vectors from two coordinates on an octahedron, as normalised bytes (stride 4) or 16-bit numbers (stride 8); the fourth component
-/// stays.
+/// Unit vectors from two coordinates on an octahedron, as normalised bytes (stride 4) or 16-bit numbers (stride 8); the
+/// fourth component stays.
 pub(super) fn octahedral(bytes: &mut [u8], stride: usize) {
     if stride == 4 {
         for v in bytes.as_chunks_mut::<4>().0 {
@@ -28,8 +28,8 @@ fn from_octahedron([x, y, one]: [f32; 3]) -> [f32; 3] {
     [x / length, y / length, z / length]
 }
 
-/// Unit quaternions from all components but the largest, which the lowest two bits of the fourth number name; the others of its bits
-/// stand for 1.
+/// Unit quaternions from all components but the largest, which the lowest two bits of the fourth number name; the
+/// others of its bits stand for 1.
 pub(super) fn quaternion(bytes: &mut [u8]) {
     for q in bytes.as_chunks_mut::<8>().0 {
         let last = word(q, 3);
@@ -43,9 +43,10 @@ pub(super) fn quaternion(bytes: &mut [u8]) {
     }
 }
 
-/// Colours and alpha from brightness and two differences of colours (YCoCg; Malvar, Sullivan and Srinivasan 2008, *Lifting-based reversible color
-/// transformations for image compression*), as bytes (stride 4) or 16-bit numbers (stride 8). The highest bit of the fourth number that is set says how
-/// many bits each has, and what is below it is alpha, of one bit less.
+/// Colours and alpha from brightness and two differences of colours (YCoCg; Malvar, Sullivan and Srinivasan
+/// 2008, *Lifting-based reversible color transformations for image compression*), as bytes (stride 4) or 16-bit numbers
+/// (stride 8). The highest bit of the fourth number that is set says how many bits each has, and what is below it is
+/// alpha, of one bit less.
 pub(super) fn color(bytes: &mut [u8], stride: usize) {
     if stride == 4 {
         for v in bytes.as_chunks_mut::<4>().0 {

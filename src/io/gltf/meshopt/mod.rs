@@ -1,10 +1,11 @@
-//! `EXT_meshopt_compression` (Kapoulkine and St. Pierre 2022, *EXT_meshopt_compression*, with its bitstream in appendix A and its filters in
-//! appendix B), and what came after it, `KHR_meshopt_compression` (Kapoulkine, St. Pierre, Knyazev and McCurdy 2025), which has a second version of
-//! the stream for elements, and one more filter.
+//! `EXT_meshopt_compression` (Kapoulkine and St. Pierre 2022, *EXT_meshopt_compression*, with its bitstream in appendix
+//! A and its filters in appendix B), and what came after it, `KHR_meshopt_compression` (Kapoulkine, St. Pierre, Knyazev
+//! and McCurdy 2025), which has a second version of the stream for elements, and one more filter.
 //!
-//! Three streams, one file each: [`attributes`](mod@attributes) for elements of any size, [`triangles`](mod@triangles) and
-//! [`indices`](mod@indices) for indices; and [`filters`], which elements may pass through after that. A stream does not say how much it
-//! holds, so the caller does. The crate meshopt, the alternative, compiles meshoptimizer's C++ and needs its own `unsafe`; the streams are four pages.
+//! Three streams, one file each: [`attributes`](mod@attributes) for elements of any size, [`triangles`](mod@triangles)
+//! and [`indices`](mod@indices) for indices; and [`filters`], which elements may pass through after that. A stream does
+//! not say how much it holds, so the caller does. The crate meshopt, the alternative, compiles meshoptimizer's C++ and
+//! needs its own `unsafe`; the streams are four pages.
 
 mod attributes;
 mod filters;

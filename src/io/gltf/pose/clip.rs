@@ -57,8 +57,8 @@ impl<'a> Clip<'a> {
         Ok(chosen.into_iter().map(|index| Self { document, index, source: &all[index] }).collect())
     }
 
-    /// Adds what it says of nodes, by their index, at a time in seconds, in place of what was said before. Before its first key and after its last one it stands
-    /// still.
+    /// Adds what it says of nodes, by their index, at a time in seconds, in place of what was said before. Before its
+    /// first key and after its last one it stands still.
     pub(super) fn add(
         &self,
         time: f64,

@@ -37,7 +37,8 @@ struct Between {
 }
 
 impl<'a> Curve<'a> {
-    /// `kind` is the type of the values, `place` the sampler's pointer; `known_times` has the accessors of times that are checked.
+    /// `kind` is the type of the values, `place` the sampler's pointer; `known_times` has the accessors of times that
+    /// are checked.
     pub(super) fn new(
         document: &'a Document<'a>,
         sampler: &AnimationSampler,
@@ -173,8 +174,8 @@ impl<'a> Curve<'a> {
     }
 }
 
-/// Between two rotations, the shorter way, at an even pace (Shoemake 1985, *Animating rotation with quaternion curves*). By libm, so that it is
-/// the same on every system.
+/// Between two rotations, the shorter way, at an even pace (Shoemake 1985, *Animating rotation with quaternion
+/// curves*). By libm, so that it is the same on every system.
 fn slerp(from: [f64; 4], to: [f64; 4], t: f64) -> [f64; 4] {
     let dot: f64 = from.iter().zip(&to).map(|(a, b)| a * b).sum();
     let (sign, cosine) = (dot.signum(), dot.abs().min(1.0));

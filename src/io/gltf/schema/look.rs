@@ -76,8 +76,8 @@ struct WebpSource {
 }
 
 impl Texture {
-    /// The image it shows, and where in the texture that is said; none where it is of a kind that is not known. A WebP picture comes before another, which is for those who
-    /// cannot read it.
+    /// The image it shows, and where in the texture that is said; none where it is of a kind that is not known. A WebP
+    /// picture comes before another, which is for those who cannot read it.
     pub(in crate::io::gltf) fn image(&self) -> Option<(usize, &'static str)> {
         let webp = self.extensions.webp.as_ref().map(|webp| (webp.source, "extensions/EXT_texture_webp/source"));
         webp.or(self.source.map(|source| (source, "source")))

@@ -22,7 +22,8 @@ pub(super) type Extensions = Map<String, Value>;
 /// What is wrong with it, and where.
 pub(super) fn parse(json: &[u8]) -> serde_json::Result<Root> {
     serde_json::from_slice(json).or_else(|error| {
-        // Whole numbers may be written as `3.0` or `5.126e3`, and of a key that is there twice the last counts: both are rare enough for a second look.
+        // Whole numbers may be written as `3.0` or `5.126e3`, and of a key that is there twice the last counts: both
+        // are rare enough for a second look.
         let Ok(value) = serde_json::from_slice(json) else { return Err(error) };
         // The first error knows its place; the second is of what is wrong apart from how numbers are written.
         let what =

@@ -1,12 +1,13 @@
 //! Choosing the planes of a BSP tree, within limits.
 //!
-//! Candidates are the planes of a few of the cell's triangles, and planes across the axes through the middle of its boxes: a smooth
-//! mesh lies on one side of all of its own planes, so that these alone would make a list of it (Ize, Wald, Parker 2008 mix both
-//! kinds for that). The surface area heuristic chooses, with the areas of the polyhedra that come out. Trying the plane of every triangle, as they do, is quadratic near the root.
+//! Candidates are the planes of a few of the cell's triangles, and planes across the axes through the middle of its
+//! boxes: a smooth mesh lies on one side of all of its own planes, so that these alone would make a list of it (Ize,
+//! Wald, Parker 2008 mix both kinds for that). The surface area heuristic chooses, with the areas of the polyhedra that
+//! come out. Trying the plane of every triangle, as they do, is quadratic near the root.
 //!
-//! Even so it is by far the slowest of the builds, and triangles that planes cut are held in many cells. So it
-//! stops after a time, or at a number of references, and says so; cells that are not divided by then are lists. The fullest cell comes first, so that a tree
-//! that was stopped is coarse everywhere, and nowhere a list of half the scene.
+//! Even so it is by far the slowest of the builds, and triangles that planes cut are held in many cells. So it stops
+//! after a time, or at a number of references, and says so; cells that are not divided by then are lists. The fullest
+//! cell comes first, so that a tree that was stopped is coarse everywhere, and nowhere a list of half the scene.
 
 use std::collections::BinaryHeap;
 use std::time::{Duration, Instant};
@@ -31,7 +32,8 @@ const DEEPEST: u32 = 60;
 const MAX_REFERENCES: [usize; 2] = [24, 4096];
 /// How long it may take.
 const LONGEST: Duration = Duration::from_secs(10);
-/// As a share of the largest coordinate, how far from a plane counts as within it: a thousand times the rounding of the distance.
+/// As a share of the largest coordinate, how far from a plane counts as within it: a thousand times the rounding of the
+/// distance.
 const DOUBT: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// A cell that may be divided.
@@ -173,7 +175,8 @@ impl Builder<'_> {
             let (behind, before) = (share(&bodies[0]), share(&bodies[1]));
             // A plane beside the cell divides nothing.
             let divides = behind > 0.0 && before > 0.0;
-            // Those within the plane are met by rays that cross it within the cell: by the sides' areas beyond the whole, twice the cut.
+            // Those within the plane are met by rays that cross it within the cell: by the sides' areas beyond the
+            // whole, twice the cut.
             let crossing = ((behind + before - 1.0) * 0.5).clamp(0.0, 1.0);
             let cost = NODE_COST + behind * back + before * front + crossing * on;
             divides.then_some(Trial { plane, cost, bodies })

@@ -1,14 +1,16 @@
-//! A BSP tree of general planes: those of the scene's own triangles, where they divide it well (Fuchs, Kedem, Naylor 1980, *On visible
-//! surface generation by a priori tree structures*; for rays Ize, Wald, Parker 2008, *Ray tracing with the BSP tree*).
+//! A BSP tree of general planes: those of the scene's own triangles, where they divide it well (Fuchs, Kedem, Naylor
+//! 1980, *On visible surface generation by a priori tree structures*; for rays Ize, Wald, Parker 2008, *Ray tracing
+//! with the BSP tree*).
 //!
-//! Each node's plane cuts a cell, a convex polyhedron, in two. Triangles within the plane stay with the node, and a ray asks them as it
-//! crosses; others lie in the cells that they reach. `build` has how planes are chosen, and when it stops; `polyhedron` the
-//! cells. Planes fit the scene better than boxes do, and cost more: to find, and to cross.
+//! Each node's plane cuts a cell, a convex polyhedron, in two. Triangles within the plane stay with the node, and a ray
+//! asks them as it crosses; others lie in the cells that they reach. `build` has how planes are chosen, and when it
+//! stops; `polyhedron` the cells. Planes fit the scene better than boxes do, and cost more: to find, and to cross.
 //!
-//! **Rounding.** A corner counts as in the plane up to a doubt of e, so an item that is on one side only may reach 2 e across. The
-//! ray's own distance from the plane is a sum of three products at t, off by less than 12 u of |n| (reach + |origin|) for all t in the
-//! scene's bounds, and by |n| times what the ray strays: 2 |n| pad covers both, since the pad is at least 8 u (reach + |origin|). So the sides are entered 2 e + 2 |n| pad
-//! too early and left as much too late.
+//! **Rounding.** A corner counts as in the plane up to a doubt of e, so an item that is on one side only may reach 2 e
+//! across. The ray's own distance from the plane is a sum of three products at t, off by less than 12 u of |n| (reach +
+//! |origin|) for all t in the scene's bounds, and by |n| times what the ray strays: 2 |n| pad covers both, since the
+//! pad is at least 8 u (reach + |origin|). So the sides are entered 2 e + 2 |n| pad too early and left as much too
+//! late.
 
 mod build;
 mod polyhedron;
@@ -157,7 +159,8 @@ impl Bsp {
         }
     }
 
-    /// The parts of a range before and behind a plane: see [`IndexRay::split`], which is this for planes across an axis.
+    /// The parts of a range before and behind a plane: see [`IndexRay::split`], which is this for planes across an
+    /// axis.
     fn split(&self, plane: &Plane, ray: &IndexRay, range: TInterval) -> (TInterval, TInterval) {
         let doubt = 2.0 * self.doubt + 2.0 * plane.normal.abs().dot(ray.pad);
         let distance = plane.distance(ray.origin);

@@ -1,7 +1,8 @@
 //! Convex polyhedra, the cells of a BSP tree: how large their surface is, and how a plane cuts them.
 //!
-//! The area decides which plane is chosen, and nothing else: of the lines that pass a convex body, the share that passes a convex part of it is
-//! the ratio of their surfaces (Santaló 1976, *Integral geometry and geometric probability*). So plain f64 will do.
+//! The area decides which plane is chosen, and nothing else: of the lines that pass a convex body, the share that
+//! passes a convex part of it is the ratio of their surfaces (Santaló 1976, *Integral geometry and geometric
+//! probability*). So plain f64 will do.
 
 use super::Plane;
 use crate::math::{Aabb, DVec3};

@@ -1,9 +1,9 @@
 //! How many cells a grid has, and what is in them.
 //!
-//! Cells are cubes as far as possible, a few to an item (Cleary, Wyvill 1988, *Analysis of an algorithm for fast ray tracing using uniform
-//! space subdivision*). Items are counted in each cell first and filled in then, in linear time and without a list for each cell. Where scales
-//! are mixed, a teapot in a stadium, a cell with too many items gets a grid of its own (Jevans, Wyvill 1989, *Adaptive voxel subdivision for ray
-//! tracing*).
+//! Cells are cubes as far as possible, a few to an item (Cleary, Wyvill 1988, *Analysis of an algorithm for fast ray
+//! tracing using uniform space subdivision*). Items are counted in each cell first and filled in then, in linear time
+//! and without a list for each cell. Where scales are mixed, a teapot in a stadium, a cell with too many items gets a
+//! grid of its own (Jevans, Wyvill 1989, *Adaptive voxel subdivision for ray tracing*).
 
 use super::{Block, Grid, NESTED, SLACK};
 use crate::math::{Aabb, DVec3, UVec3};
@@ -16,7 +16,8 @@ const DENSITY: f64 = 3.0;
 const CROWD: usize = 24;
 /// Grids within grids.
 const DEEPEST: u32 = 6;
-/// References for each item: beyond, a coarser grid serves better. Half as many in each grid within a grid, for these multiply.
+/// References for each item: beyond, a coarser grid serves better. Half as many in each grid within a grid, for these
+/// multiply.
 const MAX_REFERENCES: usize = 12;
 /// References in all where a resolution is asked for: 4 GB of them.
 const MAX_ENTRIES: usize = 1 << 30;

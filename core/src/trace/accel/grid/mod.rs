@@ -2,10 +2,10 @@
 //!
 //! `build` has how many cells there are and what is in them.
 //!
-//! A step adds a constant to the t of the next plane, and rounds: the walk may pass a plane a little early or late and name a
-//! cell that the ray misses by a hair. So items lie in every cell within [`SLACK`] of a cell's width, far more than all steps
-//! together round. A ray that is known less well than that (from very far away, or into a tiny nested grid) takes another way,
-//! [`Grid::halve`], which treats the cells as leaves of a tree of boxes.
+//! A step adds a constant to the t of the next plane, and rounds: the walk may pass a plane a little early or late and
+//! name a cell that the ray misses by a hair. So items lie in every cell within [`SLACK`] of a cell's width, far more
+//! than all steps together round. A ray that is known less well than that (from very far away, or into a tiny nested
+//! grid) takes another way, [`Grid::halve`], which treats the cells as leaves of a tree of boxes.
 
 mod build;
 

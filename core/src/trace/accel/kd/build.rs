@@ -1,10 +1,11 @@
 //! Where the planes of a kd-tree are.
 //!
-//! Each is where the surface area heuristic expects rays to cost least: cells that are empty, or large with little in them, are cut off
-//! early. Large cells choose among 32 planes an axis, counted in bins (Hunt, Mark, Stoll 2006, *Fast kd-tree construction with an adaptive
-//! error-bounded heuristic*; Shevtsov, Soupikov, Kapustin 2007, *Highly parallel fast kd-tree construction for interactive ray tracing of dynamic
-//! scenes*), small ones among the sides of all boxes: O(n log n) in all. Sorting the sides once and keeping them sorted, as Wald and Havran do,
-//! finds slightly better planes and takes three times as long to build and to read.
+//! Each is where the surface area heuristic expects rays to cost least: cells that are empty, or large with little in
+//! them, are cut off early. Large cells choose among 32 planes an axis, counted in bins (Hunt, Mark, Stoll 2006, *Fast
+//! kd-tree construction with an adaptive error-bounded heuristic*; Shevtsov, Soupikov, Kapustin 2007, *Highly parallel
+//! fast kd-tree construction for interactive ray tracing of dynamic scenes*), small ones among the sides of all boxes:
+//! O(n log n) in all. Sorting the sides once and keeping them sorted, as Wald and Havran do, finds slightly better
+//! planes and takes three times as long to build and to read.
 
 use rayon::join;
 
@@ -25,8 +26,8 @@ const FEW: usize = 32;
 const MANY: usize = 1 << 12;
 /// References for each item that cutting may add in all; every cell has its share.
 const MAX_REFERENCES: usize = 12;
-/// A tree of which the upper part is built by all threads. What is below is finished at once: two allocations for each of millions of
-/// leaves would take as long as choosing the planes.
+/// A tree of which the upper part is built by all threads. What is below is finished at once: two allocations for each
+/// of millions of leaves would take as long as choosing the planes.
 enum Branch {
     Whole(Tree),
     Plane { axis: usize, plane: f32, children: Box<[Branch; 2]> },
@@ -42,8 +43,8 @@ struct Part {
     room: usize,
 }
 
-/// An item, and its box as far as that is in the cell. Copied from cell to cell: numbers alone would take a seventh of the memory, and boxes
-/// be read in random order, which takes longer than all else.
+/// An item, and its box as far as that is in the cell. Copied from cell to cell: numbers alone would take a seventh of
+/// the memory, and boxes be read in random order, which takes longer than all else.
 #[derive(Clone, Copy)]
 struct Entry {
     bounds: Aabb,

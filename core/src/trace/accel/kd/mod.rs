@@ -1,5 +1,5 @@
-//! A kd-tree: a BSP tree of planes across the axes (Wald, Havran 2006, *On building fast kd-trees for ray tracing, and on doing that in O(N
-//! log N)*).
+//! A kd-tree: a BSP tree of planes across the axes (Wald, Havran 2006, *On building fast kd-trees for ray tracing, and
+//! on doing that in O(N log N)*).
 //!
 //! `build` has where the planes are. An item lies in every cell that its box, cut off at the cell, reaches.
 //!

@@ -1,6 +1,7 @@
 //! The triangles that one ray may hit, offered to whoever decides.
 //!
-//! A walk by itself, for what flights leave open: rounding, or what the caller knows about triangles and the tree does not.
+//! A walk by itself, for what flights leave open: rounding, or what the caller knows about triangles and the tree does
+//! not.
 
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
@@ -14,12 +15,13 @@ use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::simd::isa::{self, Kernel};
 use crate::trace::bvh::walk::{self, Visit};
 
-/// What is done with a candidate: its geometry and its primitive; says up to which t more are wanted, none where no more are.
+/// What is done with a candidate: its geometry and its primitive; says up to which t more are wanted, none where no
+/// more are.
 pub(in crate::trace) type Offer<'a> = &'a mut dyn FnMut(u32, u32) -> Option<f32>;
 
 impl Bvh {
-    /// Offers every fixed triangle that `ray` may hit up to its tmax, near ones first but for the order within a leaf; some several times.
-    /// The ray, and the triangles, may be off from those that are meant by the blur.
+    /// Offers every fixed triangle that `ray` may hit up to its tmax, near ones first but for the order within a leaf;
+    /// some several times. The ray, and the triangles, may be off from those that are meant by the blur.
     pub(in crate::trace) fn candidates(&self, ray: &Ray, blur: Blur, offer: Offer<'_>) {
         if ray.is_valid() && !self.fixed.triangles.tree().is_empty() {
             isa::dispatch(self.isa, Candidates { bvh: self, ray, blur, offer });
@@ -53,8 +55,8 @@ impl Kernel for Candidates<'_> {
     }
 }
 
-/// Calls `each` with every triangle that `test` leaves of the blocks that the ray comes to, by block and lane, and with how far it looks
-/// so far; it gives how far it looks from there on, none where it has seen enough.
+/// Calls `each` with every triangle that `test` leaves of the blocks that the ray comes to, by block and lane, and with
+/// how far it looks so far; it gives how far it looks from there on, none where it has seen enough.
 #[inline(always)]
 pub(super) fn walk<S: Simd>(
     triangles: &TriangleTree,

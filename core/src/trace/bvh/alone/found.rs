@@ -1,5 +1,5 @@
-//! The triangle that a ray by itself hits, computed: a component a lane, with the bits of [`triangle`](crate::shape::triangle), whose operations
-//! these are, in their order.
+//! The triangle that a ray by itself hits, computed: a component a lane, with the bits of
+//! [`triangle`](crate::shape::triangle), whose operations these are, in their order.
 
 use super::SingleRay;
 use crate::math::{Vec3, triangle_normal};

@@ -1,16 +1,16 @@
-//! One ray at a time among the triangles of the world, for callers who cannot wait for a second one, and for so few rays that
-//! they make no flight ([`some`]).
+//! One ray at a time among the triangles of the world, for callers who cannot wait for a second one, and for so few
+//! rays that they make no flight ([`some`]).
 //!
 //! An interface that hands over single rays (Embree's C functions) can have neither flights nor bundles, and wants the
-//! triangle's normal with the hit. So the ray walks by itself ([`super::walk`]), what it hits is noted and computed at the end
-//! ([`found`]), and the normal comes from the block that is in the cache anyway; to fetch corners from the mesh afterwards, the
-//! simpler way, costs two more steps through memory. A call takes as long as some hundred instructions more or less, so the ray is read where
-//! the caller has it ([`row`]), and what is found is written where it is wanted.
+//! triangle's normal with the hit. So the ray walks by itself ([`super::walk`]), what it hits is noted and computed at
+//! the end ([`found`]), and the normal comes from the block that is in the cache anyway; to fetch corners from the mesh
+//! afterwards, the simpler way, costs two more steps through memory. A call takes as long as some hundred instructions
+//! more or less, so the ray is read where the caller has it ([`row`]), and what is found is written where it is wanted.
 //!
 //! Callers with rules of their own about what counts (masks, filters) are shown each triangle that is hit.
 //!
-//! A caller's single ray is asked of the fixed triangles only: shapes and placements are those of [`Tracer`](crate::Tracer), whose many rays
-//! go on from place to place.
+//! A caller's single ray is asked of the fixed triangles only: shapes and placements are those of
+//! [`Tracer`](crate::Tracer), whose many rays go on from place to place.
 
 pub(super) mod candidates;
 mod found;
@@ -39,20 +39,24 @@ pub use found::TriangleFound;
 pub use row::SingleRay;
 pub use some::Travel;
 
-/// What was decided at once of a ray of which there was doubt, if [`Noted`] says that anything was; room for it is made where it is first needed, for few rays need it.
+/// What was decided at once of a ray of which there was doubt, if [`Noted`] says that anything was; room for it is made
+/// where it is first needed, for few rays need it.
 pub(super) type Doubted = Option<Found>;
 
-/// Whether a search goes on, and up to which t, or which radius; whoever wants what lies at t itself gives `t.next_up()`.
+/// Whether a search goes on, and up to which t, or which radius; whoever wants what lies at t itself gives
+/// `t.next_up()`.
 pub type VisitFlow = ControlFlow<(), f32>;
 
 impl Bvh {
-    /// The nearest [fixed](crate::World::fixed) triangle that `ray` hits, into `found`. Whether there is one. What is placed by transforms, and what is
-    /// no triangle, is not asked: [`Tracer::closest`](crate::Tracer::closest) asks everything.
+    /// The nearest [fixed](crate::World::fixed) triangle that `ray` hits, into `found`. Whether there is one. What is
+    /// placed by transforms, and what is no triangle, is not asked: [`Tracer::closest`](crate::Tracer::closest) asks
+    /// everything.
     pub fn closest_triangle(&self, ray: &SingleRay, found: &mut TriangleFound) -> bool {
         self.has_fixed() && isa::dispatch(self.isa, Alone { bvh: self, ray, found })
     }
 
-    /// Whether `ray` hits any fixed triangle, as [`Bvh::closest_triangle`] has it: [`Tracer::occluded`](crate::Tracer::occluded) asks everything.
+    /// Whether `ray` hits any fixed triangle, as [`Bvh::closest_triangle`] has it:
+    /// [`Tracer::occluded`](crate::Tracer::occluded) asks everything.
     pub fn occludes(&self, ray: &SingleRay) -> bool {
         self.has_fixed() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray })
     }
@@ -63,8 +67,9 @@ impl Bvh {
         !self.fixed.triangles.tree().is_empty()
     }
 
-    /// Shows `visitor` fixed triangles, as [`Bvh::closest_triangle`] has them, that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
-    /// has seen enough. The order is not that of t; in the high preset a triangle may come several times.
+    /// Shows `visitor` fixed triangles, as [`Bvh::closest_triangle`] has them, that `ray` hits, up to the t that it
+    /// returns last (at first the ray's tmax), until it has seen enough. The order is not that of t; in the high preset
+    /// a triangle may come several times.
     pub fn visit_triangles(&self, ray: &Ray, visitor: &mut dyn FnMut(&TriangleFound) -> VisitFlow) {
         if self.has_fixed() && ray.is_valid() {
             isa::dispatch(self.isa, VisitAll { bvh: self, ray, visitor });
@@ -125,8 +130,8 @@ impl Bvh {
         Some(noted)
     }
 
-    /// The same through the triangles at `place`: `slab` is the ray ready for the tree's nodes, `filter` makes it ready for triangles, `ray` is in the world. It is the ray
-    /// that is meant if it is not `BLURRED`.
+    /// The same through the triangles at `place`: `slab` is the ray ready for the tree's nodes, `filter` makes it ready
+    /// for triangles, `ray` is in the world. It is the ray that is meant if it is not `BLURRED`.
     #[expect(clippy::too_many_arguments, reason = "a place, a ray, and what it has found")]
     #[inline(always)]
     fn walk_through<S: Simd, Q: Query, const BLURRED: bool>(
@@ -152,8 +157,9 @@ impl Bvh {
                 for index in leaf.blocks() {
                     let mut scratch = None;
                     let block = triangles.block::<S>(index, &mut scratch);
-                    // The black box keeps the filter in memory, as it does the slabs of a single ray where nodes are entered (`walk::Enter`): without it the
-                    // compiler spreads each number over a vector before the walk, and spills them.
+                    // The black box keeps the filter in memory, as it does the slabs of a single ray where nodes are
+                    // entered (`walk::Enter`): without it the compiler spreads each number over a vector before the
+                    // walk, and spills them.
                     let candidates = std::hint::black_box(&filter).candidates::<S, BLURRED>(block, noted.limit);
                     if candidates.lanes != 0 && noted.offer::<Q>(self, doubted, place, index, block, &candidates, ray) {
                         return Visit::Stop;

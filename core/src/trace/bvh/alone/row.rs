@@ -1,8 +1,9 @@
 //! A ray by itself, made ready for nodes and triangles in as few instructions as will do.
 //!
-//! An axis a lane. Most rays have directions of which no component is small against the largest, and are where products do not overflow: for
-//! these the bounds of [`slab`](crate::trace::bvh::reject::slab) need neither replacements nor open axes, and numbers that are not finite fail the same tests. The
-//! others are made ready as those of everyone else, out of the way.
+//! An axis a lane. Most rays have directions of which no component is small against the largest, and are where products
+//! do not overflow: for these the bounds of [`slab`](crate::trace::bvh::reject::slab) need neither replacements nor
+//! open axes, and numbers that are not finite fail the same tests. The others are made ready as those of everyone else,
+//! out of the way.
 
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -54,8 +55,8 @@ impl SingleRay {
         if self.tmin < 0.0 { 0.0 } else { self.tmin }
     }
 
-    /// Made ready for nodes, and what is left to be made ready for triangles; none where it [is not valid](Ray::is_valid). `reach` is the tree's. If it is not
-    /// `BLURRED`, it is the ray that is meant.
+    /// Made ready for nodes, and what is left to be made ready for triangles; none where it [is not
+    /// valid](Ray::is_valid). `reach` is the tree's. If it is not `BLURRED`, it is the ray that is meant.
     #[inline(always)]
     pub(in crate::trace::bvh) fn ready<S: Simd, const BLURRED: bool>(
         &self,
@@ -109,8 +110,8 @@ impl SingleRay {
     }
 }
 
-/// What is left of a ray to be made ready for triangles, when it is for nodes. The root can be entered before: its numbers take some time to come, in
-/// which this is done.
+/// What is left of a ray to be made ready for triangles, when it is for nodes. The root can be entered before: its
+/// numbers take some time to come, in which this is done.
 pub(in crate::trace::bvh) struct Rest<S: Simd> {
     origin: S::V4,
     direction: S::V4,

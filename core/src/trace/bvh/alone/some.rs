@@ -1,6 +1,7 @@
 //! Some rays that make no bundle, one after the other.
 //!
-//! A few rays make no flight ([`crate::trace::bvh::flight`]) worth its name: while one waits, none of the others has a step to take.
+//! A few rays make no flight ([`crate::trace::bvh::flight`]) worth its name: while one waits, none of the others has a
+//! step to take.
 
 use super::{Doubted, Noted, SingleRay};
 use crate::ray::Ray;
@@ -46,7 +47,8 @@ impl Bvh {
         }
     }
 
-    /// Answers all rays among triangles that stand still: `done` is told of each that has hit something what it has found.
+    /// Answers all rays among triangles that stand still: `done` is told of each that has hit something what it has
+    /// found.
     #[inline(always)]
     pub(in crate::trace::bvh) fn walk_one_by_one<S: Simd, Q: Query>(
         &self,
@@ -75,8 +77,8 @@ impl Bvh {
         }
     }
 
-    /// As [`Self::walk_ready`], and then through placed objects, which may be all there is. `ray` is the same ray again, which is `ready` for the
-    /// world.
+    /// As [`Self::walk_ready`], and then through placed objects, which may be all there is. `ray` is the same ray
+    /// again, which is `ready` for the world.
     #[inline(always)]
     fn walk_from_place_to_place<S: Simd, Q: Query>(
         &self,

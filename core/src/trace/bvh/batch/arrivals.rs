@@ -1,4 +1,5 @@
-//! Rays that have gone through the triangles by themselves, in flight or alone: what most of them hit is only noted, and computed for four at a time.
+//! Rays that have gone through the triangles by themselves, in flight or alone: what most of them hit is only noted,
+//! and computed for four at a time.
 
 use std::hint::select_unpredictable;
 
@@ -18,7 +19,8 @@ pub(super) struct Arrivals<'a, Q: Query> {
 }
 
 impl<'a, Q: Query> Arrivals<'a, Q> {
-    /// None yet. An answer goes where its ray's is, and t in f64, of the last 64 of them, into `t`: that of ray i in the place of `first` + i.
+    /// None yet. An answer goes where its ray's is, and t in f64, of the last 64 of them, into `t`: that of ray i in
+    /// the place of `first` + i.
     #[inline(always)]
     pub fn new(
         bvh: &'a Bvh,
@@ -108,7 +110,8 @@ struct Pending {
 impl Pending {
     const NONE: Self = Self { rays: [0; 4], ids: [NONE; 4], places: [FIXED; 4], count: 0 };
 
-    /// One more, if a hit of it is noted: told without a branch, for whether a ray hits anything is anyone's guess. Whether they are four now.
+    /// One more, if a hit of it is noted: told without a branch, for whether a ray hits anything is anyone's guess.
+    /// Whether they are four now.
     #[inline(always)]
     fn push(&mut self, ray: usize, found: &Found) -> bool {
         let i = self.count % 4;

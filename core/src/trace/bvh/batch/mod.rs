@@ -1,5 +1,5 @@
-//! Many rays: among triangles in bundles where they are bundles, else in flight or alone, and hits computed several at a time; then one by one among
-//! everything else, of which there is little.
+//! Many rays: among triangles in bundles where they are bundles, else in flight or alone, and hits computed several at
+//! a time; then one by one among everything else, of which there is little.
 
 pub(super) mod arrivals;
 
@@ -19,8 +19,8 @@ use crate::trace::Batch;
 use crate::trace::nearest::Nearest;
 use crate::trace::spread::Spread;
 
-/// What a thread needs while it traces; kept from batch to batch, since clearing it costs as much as tracing some dozens of
-/// rays.
+/// What a thread needs while it traces; kept from batch to batch, since clearing it costs as much as tracing some
+/// dozens of rays.
 struct Workspace {
     singles: Singles,
     bundles: bundle::Scratch,
@@ -32,9 +32,10 @@ struct Singles {
     doubted: Doubted,
 }
 
-/// Placed objects that a bundle of shadow rays may enter before the rest of its batch goes apart: each costs a bundle as much as dozens of
-/// rays, most of which pass it by or are in shadow already. Of 2,500 placements a bundle enters two or three, and is faster by a
-/// quarter; it takes many more, far away, to get here. Bundles of closest hits are faster with any number.
+/// Placed objects that a bundle of shadow rays may enter before the rest of its batch goes apart: each costs a bundle
+/// as much as dozens of rays, most of which pass it by or are in shadow already. Of 2,500 placements a bundle enters
+/// two or three, and is faster by a quarter; it takes many more, far away, to get here. Bundles of closest hits are
+/// faster with any number.
 const MAX_PLACES: u32 = 10;
 
 /// Visits of single rays to placed objects that are kept waiting until they are traced together: enough for a flight.
@@ -45,8 +46,8 @@ thread_local! {
     static WORKSPACE: Cell<Option<Box<Workspace>>> = const { Cell::new(None) };
 }
 
-/// Gets this thread ready for batches: the first use of what it keeps between them takes a lock of the dynamic loader, which is held as long as a library is
-/// being loaded.
+/// Gets this thread ready for batches: the first use of what it keeps between them takes a lock of the dynamic loader,
+/// which is held as long as a library is being loaded.
 pub fn prepare_thread() {
     WORKSPACE.with(|_| ());
 }
@@ -213,8 +214,8 @@ impl Kernel for TrianglesAgain<'_> {
     }
 }
 
-/// Rays among triangles that make no bundle; hits are computed several at a time. Also tells t in f64, for the last 64 of them: that of ray i
-/// in the place of `first` + i.
+/// Rays among triangles that make no bundle; hits are computed several at a time. Also tells t in f64, for the last 64
+/// of them: that of ray i in the place of `first` + i.
 struct Unbundled<'a, Q: Query> {
     bvh: &'a Bvh,
     singles: &'a mut Singles,

@@ -1,4 +1,5 @@
-//! A range of items divided in two again and again: the binary tree from which [`collapse`](super::collapse) makes the wide one.
+//! A range of items divided in two again and again: the binary tree from which [`collapse`](super::collapse) makes the
+//! wide one.
 
 use super::split::{PrimitiveRange, Rule};
 use super::subtree::{Local, in_halves};
@@ -23,7 +24,8 @@ pub(super) struct Branch {
     pub is_leaf: bool,
     /// The least cost in at most 1, 2 .. 8 slots, behind as many infinities: in no slots.
     pub costs: [f32; 2 * WIDTH],
-    /// Of so many slots those for its first side; none where all of it is in one. In place of the first, those of its own node.
+    /// Of so many slots those for its first side; none where all of it is in one. In place of the first, those of its
+    /// own node.
     pub shares: [u8; WIDTH],
 }
 
@@ -39,8 +41,8 @@ impl Branch {
 }
 
 impl Binary {
-    /// Divides `whole` until ranges fill a block, or a leaf is no worse than its halves. Where `levels` would not suffice for anything else, down the middle; for
-    /// halves of the whole they do.
+    /// Divides `whole` until ranges fill a block, or a leaf is no worse than its halves. Where `levels` would not
+    /// suffice for anything else, down the middle; for halves of the whole they do.
     #[inline(always)]
     pub fn new<S: Simd>(whole: PrimitiveRange, levels: u32, rule: &Rule, local: &mut Local<'_, S>) -> Self {
         debug_assert!(in_halves(whole.len) <= levels, "{} items in {levels} levels", whole.len);

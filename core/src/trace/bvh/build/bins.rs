@@ -94,8 +94,9 @@ impl<const N: usize> Bins<N> {
     }
 }
 
-/// The cheapest plane before a bin that leaves something on both sides: its axis, the bin, and what it costs. Of what is in the bins on each axis
-/// there are numbers of two kinds: `counts[0]` for who are before a plane, `counts[1]` for who are behind it.
+/// The cheapest plane before a bin that leaves something on both sides: its axis, the bin, and what it costs. Of what
+/// is in the bins on each axis there are numbers of two kinds: `counts[0]` for who are before a plane, `counts[1]` for
+/// who are behind it.
 #[inline(always)]
 pub(super) fn swept<S: Simd, const N: usize>(
     boxes: &[[[f32; 8]; 3]; N],
@@ -212,7 +213,8 @@ mod tests {
         }
     }
 
-    /// Any number of items, runs of which fall into one bin, at once or in parts, are what each bin's items come to one by one; whatever was there before.
+    /// Any number of items, runs of which fall into one bin, at once or in parts, are what each bin's items come to one
+    /// by one; whatever was there before.
     #[test]
     fn bins_hold_what_falls_into_them() {
         let mut random = Random::new(9);

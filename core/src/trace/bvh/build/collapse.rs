@@ -1,9 +1,10 @@
-//! From a binary tree to the wide one that costs least: which branches become nodes, and which are taken apart into slots of a node
-//! above them (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*).
+//! From a binary tree to the wide one that costs least: which branches become nodes, and which are taken apart into
+//! slots of a node above them (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through
+//! compressed wide BVHs*).
 //!
-//! What a branch costs at least in one slot, in two, in up to eight, follows from what its sides cost: from the ends up, a few additions of
-//! vectors for each. To open the widest child until there are eight, the usual way, makes up to twice as many nodes, which are less full, and costs 2 to 6 %
-//! more (see docs/PERFORMANCE.md).
+//! What a branch costs at least in one slot, in two, in up to eight, follows from what its sides cost: from the ends
+//! up, a few additions of vectors for each. To open the widest child until there are eight, the usual way, makes up to
+//! twice as many nodes, which are less full, and costs 2 to 6 % more (see docs/PERFORMANCE.md).
 
 use super::binary::{Binary, Branch};
 use super::split::Rule;
@@ -61,7 +62,8 @@ impl Binary {
         branch.shares[0] = share[WIDTH - 1] as u8;
     }
 
-    /// The nodes of the wide tree, each before what is below it, of at most `levels`: at least a third of the binary tree's, rounded up.
+    /// The nodes of the wide tree, each before what is below it, of at most `levels`: at least a third of the binary
+    /// tree's, rounded up.
     pub fn nodes(&self, rule: &Rule, levels: usize) -> Vec<Node> {
         let best = |branch: &Branch, slots: usize| usize::from(branch.shares[slots - 1]);
         self.collapsed(rule, levels, best).unwrap_or_else(|| {
@@ -208,7 +210,8 @@ mod tests {
         [leaf.min(node + below), node + leaf.min(below)]
     }
 
-    /// What nodes cost, the root with them; also tells how many levels they have, and what is around them: boxes in nodes are wider.
+    /// What nodes cost, the root with them; also tells how many levels they have, and what is around them: boxes in
+    /// nodes are wider.
     fn cost(binary: &Binary, nodes: &[Node], node: u32) -> (f64, usize, Aabb) {
         let node = &nodes[node as usize];
         let (mut sum, mut levels, mut all) = (0.0, 0, Aabb::EMPTY);
@@ -274,7 +277,8 @@ mod tests {
         assert!(leaves > 0, "some are all one leaf");
     }
 
-    /// Where nothing has an area there are no more nodes than there must be: 256 leaves of four items, in 32 nodes, in four, in one.
+    /// Where nothing has an area there are no more nodes than there must be: 256 leaves of four items, in 32 nodes, in
+    /// four, in one.
     #[test]
     fn nodes_of_no_area_are_full() {
         fn even(ends: usize) -> Shape {
@@ -289,7 +293,8 @@ mod tests {
         assert_eq!(binary.nodes(&RULE, 9).len(), 1 + 4 + 32);
     }
 
-    /// Where what is cheapest is too deep, three levels become one. Next to what takes all slots the rest of a chain gets one, again and again.
+    /// Where what is cheapest is too deep, three levels become one. Next to what takes all slots the rest of a chain
+    /// gets one, again and again.
     #[test]
     fn levels_are_bounded() {
         let cluster = |size: f32| {

@@ -1,6 +1,6 @@
-//! From a list of boxes to a tree: binned surface area heuristic (Wald 2007, *On fast construction of SAH-based bounding
-//! volume hierarchies*), and of the binary tree that comes of it nodes of eight children (Ylitie, Karras, Laine 2017, *Efficient
-//! incoherent ray traversal on GPUs through compressed wide BVHs*).
+//! From a list of boxes to a tree: binned surface area heuristic (Wald 2007, *On fast construction of SAH-based
+//! bounding volume hierarchies*), and of the binary tree that comes of it nodes of eight children (Ylitie, Karras,
+//! Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*).
 //!
 //! | file | idea |
 //! | --- | --- |
@@ -15,13 +15,14 @@
 //! | `spatial/` | large triangles in several places: the high preset |
 //! | `morton` | neighbours along a curve: the fast preset |
 //!
-//! Ranges of items are divided in two until they fill a block, and of the branches of that binary tree those become nodes that make the
-//! wide one cheapest. Leaves are charged by blocks, ceil(n / block), so that they fill.
+//! Ranges of items are divided in two until they fill a block, and of the branches of that binary tree those become
+//! nodes that make the wide one cheapest. Leaves are charged by blocks, ceil(n / block), so that they fill.
 //!
-//! That is done for subtrees, each by one thread unless there are few. Of a node above these the child with the largest surface is divided until there are eight or
-//! none is worth it, and what is below each child is made beside the others. There are few of these nodes, and nothing has to be kept of their binary tree. The
-//! tree is the same for any number of threads and any instruction set: what a range becomes depends on what is in it and above it,
-//! chunks have a fixed size, and no arithmetic is fused.
+//! That is done for subtrees, each by one thread unless there are few. Of a node above these the child with the largest
+//! surface is divided until there are eight or none is worth it, and what is below each child is made beside the
+//! others. There are few of these nodes, and nothing has to be kept of their binary tree. The tree is the same for any
+//! number of threads and any instruction set: what a range becomes depends on what is in it and above it, chunks have a
+//! fixed size, and no arithmetic is fused.
 
 mod binary;
 mod bins;
@@ -57,7 +58,8 @@ const TASK: u32 = 1 << 14;
 /// Where there are fewer subtrees for each thread than this, several threads make one.
 const FEW: usize = 4;
 
-/// Levels of nodes above subtrees: whatever is below these is one, of however many items. No mesh but one made for it gets there.
+/// Levels of nodes above subtrees: whatever is below these is one, of however many items. No mesh but one made for it
+/// gets there.
 const TOP_LEVELS: usize = 18;
 
 /// Levels of all nodes. One more is left for what others put below a tree's leaves (`clusters`).
@@ -268,8 +270,8 @@ mod tests {
         1 + inner.map(|(_, child)| levels(tree, child)).max().unwrap_or(0)
     }
 
-    /// Clusters, each half as large as the one before and beside it: the upper nodes, the binary trees below and the nodes chosen from these would all be deeper
-    /// than they may.
+    /// Clusters, each half as large as the one before and beside it: the upper nodes, the binary trees below and the
+    /// nodes chosen from these would all be deeper than they may.
     fn shrinking(clusters: u32, each: u32) -> Vec<Record> {
         let mut state = Random::new(3);
         let item = |i: u32| {

@@ -1,11 +1,11 @@
-//! Triangles along a space-filling curve (Lauterbach, Garland, Sengupta, Luebke, Manocha 2009, *Fast BVH construction on
-//! GPUs*): the quick way to blocks of neighbours.
+//! Triangles along a space-filling curve (Lauterbach, Garland, Sengupta, Luebke, Manocha 2009, *Fast BVH construction
+//! on GPUs*): the quick way to blocks of neighbours.
 //!
-//! The fast presets sort triangles by Morton code, cut the curve into clusters of up to 64 at borders of cells, and put each
-//! eight of a cluster that follow one another into a block. A cluster becomes one node; the tree above the clusters is
-//! built by the surface area heuristic, over a fortieth of the items (Garanzha, Pantaleoni, McAllister 2011, *Simpler
-//! and faster HLBVH with work queues*). A tree by the heuristic down to the blocks, tried first, took twice as long and was
-//! no better: most of what is lost is lost in the blocks.
+//! The fast presets sort triangles by Morton code, cut the curve into clusters of up to 64 at borders of cells, and put
+//! each eight of a cluster that follow one another into a block. A cluster becomes one node; the tree above the
+//! clusters is built by the surface area heuristic, over a fortieth of the items (Garanzha, Pantaleoni, McAllister
+//! 2011, *Simpler and faster HLBVH with work queues*). A tree by the heuristic down to the blocks, tried first, took
+//! twice as long and was no better: most of what is lost is lost in the blocks.
 
 use rayon::prelude::*;
 
@@ -48,9 +48,10 @@ pub(in crate::trace::bvh) fn sorted(meshes: &Meshes) -> Vec<Coded> {
     sorted_by_code(coded)
 }
 
-/// From a triangle to the cell of its middle, the cells being nearly cubes: each bit halves the longest side of what is left (Vinkler, Bittner,
-/// Havran 2017, *Extended Morton codes for high performance bounding volume hierarchy construction*). With as many bits for each
-/// axis, a terrain would leave most of those for its height unused, and twenty triangles of twenty million would be in a cell.
+/// From a triangle to the cell of its middle, the cells being nearly cubes: each bit halves the longest side of what is
+/// left (Vinkler, Bittner, Havran 2017, *Extended Morton codes for high performance bounding volume hierarchy
+/// construction*). With as many bits for each axis, a terrain would leave most of those for its height unused, and
+/// twenty triangles of twenty million would be in a cell.
 struct Grid {
     /// Three times the smallest corner: corners are added up, not averaged.
     origin: Vec3,
@@ -111,7 +112,8 @@ const TOP_BITS: u32 = LARGE_BIT + 1 - 2 * LOW_BITS;
 /// Bits that buckets are sorted by at a time, twice.
 const LOW_BITS: u32 = 10;
 
-/// What one thread sorts by the highest bits, or cuts into clusters, at a time: codes and their copy fit the second cache.
+/// What one thread sorts by the highest bits, or cuts into clusters, at a time: codes and their copy fit the second
+/// cache.
 const CHUNK: usize = 1 << 15;
 
 /// Buckets of at most this many are sorted by comparing: to go through all counts would take longer.
@@ -120,8 +122,8 @@ const BY_COMPARING: usize = 256;
 /// All are sorted so where they are no more than these: to wake other threads would take longer.
 const ALONE: usize = 1 << 12;
 
-/// By rising code, those with equal codes as they came: each chunk by the highest bits, what has these in common from all
-/// chunks into one bucket, and each bucket by the other bits; all of it by all threads. Numbers rise in `coded`.
+/// By rising code, those with equal codes as they came: each chunk by the highest bits, what has these in common from
+/// all chunks into one bucket, and each bucket by the other bits; all of it by all threads. Numbers rise in `coded`.
 fn sorted_by_code(mut coded: Vec<Coded>) -> Vec<Coded> {
     if coded.len() <= ALONE {
         sort_by_comparing(&mut coded);
@@ -182,8 +184,8 @@ fn counting_sort(from: &[Coded], to: &mut [Coded], bits: u32, shift: u32) -> Vec
     places
 }
 
-/// Lengths of the clusters, in order: each of at most `most` items, and cut from others where the highest bit of the codes
-/// changes.
+/// Lengths of the clusters, in order: each of at most `most` items, and cut from others where the highest bit of the
+/// codes changes.
 pub(in crate::trace::bvh) fn clusters(sorted: &[Coded], most: usize) -> Vec<usize> {
     if sorted.len() > CHUNK {
         let (left, right) = sorted.split_at(cut(sorted));
@@ -268,7 +270,8 @@ mod tests {
         assert_eq!(clusters(&codes, 32), one_by_one(&codes, 32));
     }
 
-    /// Few codes and many, of one bucket and of all: buckets on either side of [`BY_COMPARING`], and chunks that are not full.
+    /// Few codes and many, of one bucket and of all: buckets on either side of [`BY_COMPARING`], and chunks that are
+    /// not full.
     #[test]
     fn sorting_is_stable() {
         let some_bits = [0x7fff_ffff, 0x7fc0_07ff, 0x00ff_ffff, 0x000f_fc00, 0x3ff];

@@ -46,8 +46,8 @@ pub struct Options<'a> {
     pub preset: Preset,
     /// What with; must be available. Neither the tree nor hits depend on it.
     pub isa: Isa,
-    /// Called from any thread with numbers of primitives that have found their place. They add up to all that can be hit,
-    /// stored ones and placed objects; in the high preset to all references, up to 1.3 times as many.
+    /// Called from any thread with numbers of primitives that have found their place. They add up to all that can be
+    /// hit, stored ones and placed objects; in the high preset to all references, up to 1.3 times as many.
     pub progress: Option<&'a (dyn Fn(u64) + Sync)>,
 }
 

@@ -13,7 +13,8 @@ pub(super) struct Rule {
     pub block: u32,
     /// Most items in a leaf.
     pub leaf: u32,
-    /// Whether large ranges are judged by a part of their items: few that are much larger than all others are not seen then.
+    /// Whether large ranges are judged by a part of their items: few that are much larger than all others are not seen
+    /// then.
     pub samples: bool,
 }
 
@@ -119,8 +120,8 @@ impl<S: Simd> Cheapest<S> {
         Self { least: S::V4::splat(f32::INFINITY), place: S::V4::splat(0.0) }
     }
 
-    /// Tries a place, later than those before, with its cost on each axis, and a fourth number that is passed over. NaN is not cheap: an empty side
-    /// costs infinity times zero.
+    /// Tries a place, later than those before, with its cost on each axis, and a fourth number that is passed over. NaN
+    /// is not cheap: an empty side costs infinity times zero.
     #[inline(always)]
     pub fn offer(&mut self, place: usize, costs: S::V4) {
         let is_less = costs.less(self.least);
@@ -146,8 +147,8 @@ impl Split {
     /// Into halves, for items that no plane divides.
     pub const HALF: Self = Self { cut: Cut::Half, cost: f32::INFINITY };
 
-    /// Puts the items of the left side first, and gives the two sides; `items` are those of `range`. A plane that leaves
-    /// nothing on one side gives an empty range.
+    /// Puts the items of the left side first, and gives the two sides; `items` are those of `range`. A plane that
+    /// leaves nothing on one side gives an empty range.
     #[inline(always)]
     pub fn partition<S: Simd>(&self, items: &mut [Record], range: &PrimitiveRange) -> [PrimitiveRange; 2] {
         let nothing = S::V8::splat(f32::NEG_INFINITY);
@@ -164,7 +165,8 @@ impl Split {
                     items[split] = item;
                     split += usize::from(is_left);
                 }
-                // Into memory here and not before: else both are kept there in the loop, too, since they live on across calls, and each item waits for the last.
+                // Into memory here and not before: else both are kept there in the loop, too, since they live on across
+                // calls, and each item waits for the last.
                 (left, right) = black_box((left, right));
             }
             Cut::Mask(mask) => {
@@ -204,7 +206,8 @@ impl Split {
         left: S::V8,
         right: S::V8,
     ) -> [PrimitiveRange; 2] {
-        // Doubled centres lie within doubled boxes: not always the smallest box, but to find that one would take another look at each item.
+        // Doubled centres lie within doubled boxes: not always the smallest box, but to find that one would take
+        // another look at each item.
         let centres = S::V8::load(&range.centres);
         let (mut left_centres, mut right_centres) = (left.add(left).min(centres), right.add(right).min(centres));
         if let Cut::Plane { axis, at } = self.cut {
@@ -264,7 +267,8 @@ mod tests {
         prop_oneof![4 => (0u8..6).prop_map(f32::from), 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]
     }
 
-    /// Each side has the items that the plane leaves on it, the box around them, and a box around their centres that ends at the plane.
+    /// Each side has the items that the plane leaves on it, the box around them, and a box around their centres that
+    /// ends at the plane.
     #[test]
     fn sides_are_those_of_the_plane() {
         let mut random = Random::new(5);

@@ -175,7 +175,8 @@ impl<'a, S: Simd> Local<'a, S> {
         Self { rule, items, base, finder: Finder::new() }
     }
 
-    /// The two sides of `range`, by the best split, or down the middle where `levels` would not suffice for anything else; none where a leaf is no worse.
+    /// The two sides of `range`, by the best split, or down the middle where `levels` would not suffice for anything
+    /// else; none where a leaf is no worse.
     #[inline(always)]
     pub fn divide(&mut self, range: &PrimitiveRange, levels: u32) -> Option<[PrimitiveRange; 2]> {
         let split = if in_halves(range.len) < levels { self.find(range) } else { Split::HALF };
@@ -224,8 +225,8 @@ pub(super) fn binned<S: Simd, const N: usize>(
 /// Items by which a large range is judged.
 pub(super) const SAMPLE: usize = 1 << 11;
 
-/// One item of each of [`SAMPLE`] equal stretches: not always the first, or a mesh of even rows would be judged by a few of its
-/// columns.
+/// One item of each of [`SAMPLE`] equal stretches: not always the first, or a mesh of even rows would be judged by a
+/// few of its columns.
 #[inline(always)]
 pub(super) fn sample(items: &[Record]) -> impl Iterator<Item = &Record> {
     let stride = items.len() / SAMPLE;

@@ -73,8 +73,8 @@ impl Shared<'_> {
     }
 }
 
-/// Brings the left sides of all chunks together at the front: what is of the right side there changes place with what is
-/// of the left side behind.
+/// Brings the left sides of all chunks together at the front: what is of the right side there changes place with what
+/// is of the left side behind.
 fn gather(items: &mut [Record], sides: &[[PrimitiveRange; 2]], left_len: usize) {
     let (front, back) = items.split_at_mut(left_len);
     let (mut gaps, mut strays) = (Vec::new(), Vec::new());

@@ -1,4 +1,5 @@
-//! Rays of a bundle, of which closest hits are wanted, that go through a placed object each by itself, because they are no bundle in its coordinates.
+//! Rays of a bundle, of which closest hits are wanted, that go through a placed object each by itself, because they are
+//! no bundle in its coordinates.
 
 use super::found::BundleFound;
 use super::range::RayIntervals;

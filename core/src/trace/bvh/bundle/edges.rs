@@ -1,9 +1,10 @@
 //! Eight triangles seen from the common origin of a bundle: normals of their edges, and bounds on the rounding.
 //!
-//! With A, B, C the corners relative to the origin, the edge function at A is d . (B x C) = d . (B x (C - B)). The second
-//! form is computed: its products are of the size of the edge, not of the distance, so it does not cancel. The direction
-//! is the bundle's (p, q, +-1), with p and q off by 2 u. With u = 2^-24, L the largest component of a corner relative to
-//! the origin, s the largest of an edge, D >= 1 the largest of a direction, and the origin off by at most b:
+//! With A, B, C the corners relative to the origin, the edge function at A is d . (B x C) = d . (B x (C - B)). The
+//! second form is computed: its products are of the size of the edge, not of the distance, so it does not cancel. The
+//! direction is the bundle's (p, q, +-1), with p and q off by 2 u. With u = 2^-24, L the largest component of a corner
+//! relative to the origin, s the largest of an edge, D >= 1 the largest of a direction, and the origin off by at most
+//! b:
 //!
 //! | value | rounding | origin off |
 //! | --- | --- | --- |
@@ -11,13 +12,13 @@
 //! | slope d . N | 46 u D s^2 | 0 |
 //! | height A . N | 48 u L s^2 | 6 b s^2 |
 //!
-//! Where the bundle is turned, a ray's own origin is at its far end, most often on a surface. On which side of the plane
-//! it lies, t' is too coarse to tell, but C . N does, C being A less the ray's end: C is off by u L + b and small, N by
-//! 8 u s^2 a component, and product and sum by as much again.
+//! Where the bundle is turned, a ray's own origin is at its far end, most often on a surface. On which side of the
+//! plane it lies, t' is too coarse to tell, but C . N does, C being A less the ray's end: C is off by u L + b and
+//! small, N by 8 u s^2 a component, and product and sum by as much again.
 //!
-//! In an object's coordinates slopes are off by 4 u of themselves and u / 4, not by 2 u: that makes 55 u of the first two. All
-//! three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b. Nothing may overflow
-//! ([`Bundle::may_overflow`]) but C . N, whose C is as long as the ray: that counts only where it is finite.
+//! In an object's coordinates slopes are off by 4 u of themselves and u / 4, not by 2 u: that makes 55 u of the first
+//! two. All three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b. Nothing may
+//! overflow ([`Bundle::may_overflow`]) but C . N, whose C is as long as the ray: that counts only where it is finite.
 
 use super::rays::Bundle;
 use crate::math::UNIT_ROUNDOFF;
@@ -29,14 +30,15 @@ pub(super) struct Edges {
     /// On the bundle's axes, the third turned forward: the scalar product with (p, q, 1) is the edge function, and with
     /// the fourth, the triangle's own normal, the slope; in a parallel bundle t'.
     pub normals: [[[f32; LANES]; 3]; 4],
-    /// t' times the slope, for the least and the most that t' may be in view of all rounding; of a parallel bundle, what is added to t' instead.
+    /// t' times the slope, for the least and the most that t' may be in view of all rounding; of a parallel bundle,
+    /// what is added to t' instead.
     pub near_height: [f32; LANES],
     pub far_height: [f32; LANES],
     pub edge_error: [f32; LANES],
     /// The first corner relative to the bundle's origin, on the same axes as the normals.
     pub corner: [[f32; LANES]; 3],
-    /// Of a parallel bundle: the third component of the triangle's normal, of such a length that a unit along the rays adds 1; the other two are those of the fourth normal, with
-    /// signs changed.
+    /// Of a parallel bundle: the third component of the triangle's normal, of such a length that a unit along the rays
+    /// adds 1; the other two are those of the fourth normal, with signs changed.
     pub facing: [f32; LANES],
     /// Error of a corner relative to a ray's own origin, and of a normal's component.
     pub corner_error: [f32; LANES],
@@ -95,7 +97,8 @@ impl Edges {
         if lanes == 0 {
             return None;
         }
-        // t' is off by (1 + x)(1 + y) - 1, x and y being the relative errors of height and slope, and by a few roundings.
+        // t' is off by (1 + x)(1 + y) - 1, x and y being the relative errors of height and slope, and by a few
+        // roundings.
         let (x, y) = (height_error.div(height), slope_error.div(least_slope.sub(slope_error)));
         let quarter = splat(0.25);
         let tame = zero.less(x).and(x.at_most(quarter)).and(zero.less(y)).and(y.at_most(quarter));

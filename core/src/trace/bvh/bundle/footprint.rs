@@ -1,12 +1,14 @@
-//! Where a bundle sees triangles: rectangles of slopes (in a parallel bundle, of where rays are), by which most rays are told apart from small triangles.
+//! Where a bundle sees triangles: rectangles of slopes (in a parallel bundle, of where rays are), by which most rays
+//! are told apart from small triangles.
 //!
-//! A triangle of the size of a pixel concerns one ray or two of a bundle's 64. The rectangle around the slopes of its corners,
-//! held against those of eight rows of eight rays, says which, at the price of one group's edge functions.
+//! A triangle of the size of a pixel concerns one ray or two of a bundle's 64. The rectangle around the slopes of its
+//! corners, held against those of eight rows of eight rays, says which, at the price of one group's edge functions.
 //!
-//! A ray that hits a triangle has a slope between the least and the largest of the corners', all of them in front of the origin. Let u =
-//! 2^-24, L be the largest component of a corner relative to the origin, b how far the origin may be off, z > 0 a corner's depth, g its
-//! slope. A component is off by e = u L + b, the quotient by e (1 + |g|) / z and 2 u |g| for reciprocal and product, and the ray's
-//! own slope by 4.25 u D, D >= 1 being the largest of a direction ([`Edges`](super::edges::Edges)).
+//! A ray that hits a triangle has a slope between the least and the largest of the corners', all of them in front of
+//! the origin. Let u = 2^-24, L be the largest component of a corner relative to the origin, b how far the origin may
+//! be off, z > 0 a corner's depth, g its slope. A component is off by e = u L + b, the quotient by e (1 + |g|) / z and
+//! 2 u |g| for reciprocal and product, and the ray's own slope by 4.25 u D, D >= 1 being the largest of a direction
+//! ([`Edges`](super::edges::Edges)).
 
 use super::rays::Bundle;
 use super::rows::{ROWS, Rows};
@@ -50,7 +52,8 @@ impl Footprints {
         // Half as much again and more, for what is rounded here, and for 1 / z being off itself.
         let pad = error.mul(splat(1.5)).mul(one.add(largest)).div(nearest);
         let pad = largest.mul_add(splat(4.0 * u), splat(8.0 * u * bundle.largest)).add(pad);
-        // Where a corner is not in front for sure, or 1 / z is too large, the triangle may be seen anywhere; NaN included.
+        // Where a corner is not in front for sure, or 1 / z is too large, the triangle may be seen anywhere; NaN
+        // included.
         let in_front = error.mul_add(splat(4.0), splat(1.0 / HUGE)).less(nearest);
         let mut seen = Self { low: [[0.0; LANES]; 2], high: [[0.0; LANES]; 2] };
         for i in 0..2 {

@@ -52,7 +52,8 @@ impl BundleFound {
         (self.noted, self.place, self.computed) = ([NONE; RAYS], [FIXED; RAYS], 0);
     }
 
-    /// In another tree, for which `bundle` was made ready. Rays that are not `wanted` look no farther, so that they keep none waiting.
+    /// In another tree, for which `bundle` was made ready. Rays that are not `wanted` look no farther, so that they
+    /// keep none waiting.
     #[inline(always)]
     pub fn enter(&mut self, bundle: &Bundle, wanted: u64) {
         (self.limit, self.sure) = (bundle.limit, bundle.end);
@@ -197,12 +198,13 @@ fn answer<Q: Query>(hits: &FourHits, t: &mut [f64; 4], answers: &mut [Q::Answer;
     }
 }
 
-/// Answers for those of the four rays of a chunk that hit a triangle for sure: first for those that hit a fixed one, then for those
-/// that hit a placed one. The other lanes compute something harmless meanwhile.
+/// Answers for those of the four rays of a chunk that hit a triangle for sure: first for those that hit a fixed one,
+/// then for those that hit a placed one. The other lanes compute something harmless meanwhile.
 ///
-/// For fixed ones what remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough.
-/// It is: where a hit is sure, height and slope are known to a quarter of themselves in f32 ([`Edges`](super::edges::Edges)). f64 rounds
-/// 2^29 times finer, and a t known to 2^-27 is wanted; both count some 50 roundings of the same products. For a ray by itself ([`single`](super::single)),
+/// For fixed ones what remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise
+/// enough. It is: where a hit is sure, height and slope are known to a quarter of themselves in f32
+/// ([`Edges`](super::edges::Edges)). f64 rounds 2^29 times finer, and a t known to 2^-27 is wanted; both count some 50
+/// roundings of the same products. For a ray by itself ([`single`](super::single)),
 /// [`woop`](crate::trace::bvh::reject::woop) shows it.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "four lanes of everything")]

@@ -1,10 +1,12 @@
-//! A bundle meets a block of eight triangles: pairs of a triangle and a group of rays, one after the other in one loop without branches.
+//! A bundle meets a block of eight triangles: pairs of a triangle and a group of rays, one after the other in one loop
+//! without branches.
 //!
-//! Which rows of rays may see which triangles is told for all of them at once, by [`Footprints`](super::footprint::Footprints). A loop over the triangles, in it one over each one's
-//! groups, in it a branch for a group that misses and another for one that hits, was ended or taken nobody could tell when: what such a branch has let
-//! begin in vain is known late, and took as long as all that was computed. Now whatever a pair may need is computed of every pair, but for triangles
-//! of which a bundle sees both sides. A hit without doubt is noted in place; what is left in doubt is kept in a row, and decided when all pairs are
-//! through.
+//! Which rows of rays may see which triangles is told for all of them at once, by
+//! [`Footprints`](super::footprint::Footprints). A loop over the triangles, in it one over each one's groups, in it a
+//! branch for a group that misses and another for one that hits, was ended or taken nobody could tell when: what such a
+//! branch has let begin in vain is known late, and took as long as all that was computed. Now whatever a pair may need
+//! is computed of every pair, but for triangles of which a bundle sees both sides. A hit without doubt is noted in
+//! place; what is left in doubt is kept in a row, and decided when all pairs are through.
 
 use super::edges::Edges;
 use super::found::DONE;
@@ -173,7 +175,8 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
         changed
     }
 
-    /// Triangles of which rays may see either side: where signs agree, it is decided at once. They are so few that branches do no harm.
+    /// Triangles of which rays may see either side: where signs agree, it is decided at once. They are so few that
+    /// branches do no harm.
     #[inline(always)]
     fn meet_vague<S: Simd>(&mut self, edges: &Edges, first: u32, pairs: Pairs) -> bool {
         let mut changed = false;
@@ -205,7 +208,8 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
         S::Wide::splat(edges.edge_error[pair.lane()]).less(u.min(v).min(w)).bits()
     }
 
-    /// A bit for each ray with an origin of its own, as those of turned and of parallel bundles, that starts beyond the triangle's plane.
+    /// A bit for each ray with an origin of its own, as those of turned and of parallel bundles, that starts beyond the
+    /// triangle's plane.
     #[inline(always)]
     fn behind_starts<S: Simd>(&self, edges: &Edges, pair: Pair) -> u32 {
         let (splat, lane, group) = (S::Wide::splat, pair.lane(), pair.group::<S>());

@@ -1,23 +1,23 @@
 //! A bundle of up to 64 rays against a tree at once: the fastest way for camera rays, and for shadow rays of a light.
 //!
-//! Its rays have a point in common, or a direction ([`pencil`]). What follows is of those with a point, and so is what each file says; [`parallel`] says what is otherwise
-//! with a direction.
+//! Its rays have a point in common, or a direction ([`pencil`]). What follows is of those with a point, and so is what
+//! each file says; [`parallel`] says what is otherwise with a direction.
 //!
 //! - **Nodes**: eight boxes are tested against the rectangle of all slopes, an interval test that rejects for all rays
 //!   (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*). What
 //!   remains is tested against all rays; where they are three or fewer, each of them against all boxes ([`way`]).
-//! - **Triangles**: with a common origin, the edge function of a ray is the scalar product of its direction with a normal
-//!   that belongs to the edge. Eight triangles are rejected at once by the rectangle of slopes, and by rows of rays; of the others each group
-//!   of rays takes four scalar products ([`meeting`]). Leaves that few rays enter are tested ray by ray instead, against eight triangles
-//!   at once ([`single`]).
-//! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
-//!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
-//!   and v of what was noted are computed four rays at a time
+//! - **Triangles**: with a common origin, the edge function of a ray is the scalar product of its direction with a
+//!   normal that belongs to the edge. Eight triangles are rejected at once by the rectangle of slopes, and by rows of
+//!   rays; of the others each group of rays takes four scalar products ([`meeting`]). Leaves that few rays enter are
+//!   tested ray by ray instead, against eight triangles at once ([`single`]).
+//! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is
+//!   only noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end
+//!   t, u and v of what was noted are computed four rays at a time
 //!   ([`TriangleTree::hits`](super::levels::triangles::TriangleTree::hits)), with the bits that a single ray would get.
-//! - **Placed objects**: a bundle with a point in common is one in their coordinates, too. It is brought there when it comes to a placement, and
-//!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`alone`]).
-//!   Shadow rays, and those that are much farther apart than triangles are wide, wait there for those of other bundles instead, and fly
-//!   ([`super::flight`]).
+//! - **Placed objects**: a bundle with a point in common is one in their coordinates, too. It is brought there when it
+//!   comes to a placement, and goes on as in the world. Where it crosses an octant there, which in the world would
+//!   divide it, its rays go on one by one ([`alone`]). Shadow rays, and those that are much farther apart than
+//!   triangles are wide, wait there for those of other bundles instead, and fly ([`super::flight`]).
 
 mod alone;
 mod edges;
@@ -70,7 +70,8 @@ pub(super) struct Scratch {
     part: Part,
 }
 
-/// As many of a placed object's triangles fit between shadow rays that go through it each by itself. With 1 to 20 shadow rays of 2,500 placements take as long. Closest hits gain nothing by going alone, however many there are.
+/// As many of a placed object's triangles fit between shadow rays that go through it each by itself. With 1 to 20
+/// shadow rays of 2,500 placements take as long. Closest hits gain nothing by going alone, however many there are.
 const GRAINS: f32 = 20.0;
 
 /// Places on a stack.
@@ -98,9 +99,10 @@ impl Scratch {
     }
 }
 
-/// Traces up to 64 rays that start in one point (or, for any hit, that end in one), or run the same way, through all triangles, into `answers` of
-/// the same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
-/// have too little in common. Of any hit some may have to be asked of placed objects yet: `scratch.deferred`, among whom ray 0 is called `first`.
+/// Traces up to 64 rays that start in one point (or, for any hit, that end in one), or run the same way, through all
+/// triangles, into `answers` of the same length and, for closest hits, `scratch.t`. A bit is set in the result for
+/// every ray that was traced; the others have too little in common. Of any hit some may have to be asked of placed
+/// objects yet: `scratch.deferred`, among whom ray 0 is called `first`.
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query>(
     scratch: &mut Scratch,
@@ -113,8 +115,8 @@ pub(super) fn trace<S: Simd, Q: Query>(
     *entered = 0;
     // Of a part; filled only where there is one.
     let mut parted = None;
-    // All of them, if they fill a bundle. If they do not, or make none, those of one octant after the other. In one loop, so
-    // that what is called here, of which most of the kernel consists, is compiled once.
+    // All of them, if they fill a bundle. If they do not, or make none, those of one octant after the other. In one
+    // loop, so that what is called here, of which most of the kernel consists, is compiled once.
     let mut octants = if rays.len() == RAYS { None } else { Some(Octants::new(rays)) };
     let mut done = 0;
     loop {
@@ -201,7 +203,8 @@ impl<Q: Query> Kernel for OfParallel<'_, Q> {
 }
 
 impl One {
-    /// Traces the bundle, which is made of these rays; the first `count` of them matter. False, and nothing done, where it is too steep for a tree.
+    /// Traces the bundle, which is made of these rays; the first `count` of them matter. False, and nothing done, where
+    /// it is too steep for a tree.
     #[inline(always)]
     fn trace<S: Simd, Q: Query, P: Pencil>(
         &mut self,

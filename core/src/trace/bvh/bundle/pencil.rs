@@ -1,7 +1,9 @@
-//! What the rays of a bundle have in common: a point ([`Central`]), or a direction ([`Parallel`](super::parallel::Parallel)).
+//! What the rays of a bundle have in common: a point ([`Central`]), or a direction
+//! ([`Parallel`](super::parallel::Parallel)).
 //!
-//! Either way a ray is two numbers, where it crosses a plane across the bundle's axis, and everything that a bundle asks is linear in them. A point (x, y, z) on the bundle's
-//! axes, z along them and relative to the bundle's origin, is on the ray (p, q)
+//! Either way a ray is two numbers, where it crosses a plane across the bundle's axis, and everything that a bundle
+//! asks is linear in them. A point (x, y, z) on the bundle's axes, z along them and relative to the bundle's origin, is
+//! on the ray (p, q)
 //!
 //! | | with a common point | with a common direction (k, l, 1) |
 //! | --- | --- | --- |
@@ -24,9 +26,11 @@ pub(super) trait Pencil {
     const IS_PARALLEL: bool;
     /// Made ready for slab tests in a tree that reaches that far. None where numbers are too large.
     fn slab(bundle: &Bundle, reach: Vec3) -> Option<BundleSlab>;
-    /// The t' at which a ray meets a plane, each as it is made ready for the other: in [`Boxes`](super::slab::Boxes) and [`Bundle::slabs`].
+    /// The t' at which a ray meets a plane, each as it is made ready for the other: in [`Boxes`](super::slab::Boxes)
+    /// and [`Bundle::slabs`].
     fn meet<V: Vector>(plane: V, ray: V) -> V;
-    /// The edges of a block's triangles, and a bit for every one that some ray of the bundle may hit before `most`; none if there is none.
+    /// The edges of a block's triangles, and a bit for every one that some ray of the bundle may hit before `most`;
+    /// none if there is none.
     fn edges<S: Simd>(block: &Block, bundle: &Bundle, most: f32) -> Option<(u32, Edges)>;
     /// Where the bundle sees triangles.
     fn footprints<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], bundle: &Bundle) -> Footprints;

@@ -32,8 +32,8 @@ impl Goal for Places<'_> {
     }
 }
 
-/// The way of a bundle from place to place: first to the fixed triangles, then to placements in the order in which it enters
-/// their boxes, as long as these are near enough.
+/// The way of a bundle from place to place: first to the fixed triangles, then to placements in the order in which it
+/// enters their boxes, as long as these are near enough.
 pub(super) struct Tour<'a, P> {
     places: Places<'a>,
     /// None where there are no placements.

@@ -53,7 +53,8 @@ impl RayIntervals {
                 let (old_sure, old_limit) = (S::Wide::at(&self.sure, group), S::Wide::at(&self.limit, group));
                 let (mut least, mut most) = (least, most);
                 if P::IS_PARALLEL {
-                    // The slack of both is more than the difference rounds, for neither is much less than where the ray starts.
+                    // The slack of both is more than the difference rounds, for neither is much less than where the ray
+                    // starts.
                     let start = S::Wide::at(&bundle.start[2], group);
                     least = least.mul_add(splat(1.0 - SLACK), splat(-TINY)).sub(start);
                     most = most.mul_add(splat(1.0 + SLACK), splat(TINY)).sub(start);

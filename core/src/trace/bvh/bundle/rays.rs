@@ -1,17 +1,19 @@
-//! Up to 64 rays that share an origin, or that end in one point: made ready for tests in common. (Those that share a direction: [`super::parallel`].)
+//! Up to 64 rays that share an origin, or that end in one point: made ready for tests in common. (Those that share a
+//! direction: [`super::parallel`].)
 //!
 //! **Projection.** All rays run the same way along one axis, the bundle's; a ray is its slopes (p, q) against it, and t
 //! is measured along it: t' = t |d|, d being the direction's component. Box and triangle tests then take two products
-//! where three were, boxes are entered along the axis at the same t' by all rays, and the rectangle of all slopes bounds
-//! the bundle more tightly than a box of directions would.
+//! where three were, boxes are entered along the axis at the same t' by all rays, and the rectangle of all slopes
+//! bounds the bundle more tightly than a box of directions would.
 //!
 //! **Turning.** Shadow rays towards a point light do not share their origin but their end. They are turned round: the
-//! bundle starts at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit is
-//! asked of the rays as they were given.
+//! bundle starts at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit
+//! is asked of the rays as they were given.
 //!
-//! **Placed.** In the coordinates of an object the same rays are a bundle again ([`Bundle::place`]), with an origin that is not quite
-//! the one that is meant, and directions that are rounded: each component by u, so that slopes are off by twice as much as in the
-//! world. From bundle to bundle results are handed on in t ([`RayIntervals`]), which all of them share.
+//! **Placed.** In the coordinates of an object the same rays are a bundle again ([`Bundle::place`]), with an origin
+//! that is not quite the one that is meant, and directions that are rounded: each component by u, so that slopes are
+//! off by twice as much as in the world. From bundle to bundle results are handed on in t ([`RayIntervals`]), which all
+//! of them share.
 
 use std::marker::PhantomData;
 
@@ -47,8 +49,8 @@ pub(super) struct Bundle {
     pub depth: PerRay,
     /// The least of them.
     pub least_depth: f32,
-    /// Where a ray crosses a plane across the axis ([`Pencil`](super::pencil::Pencil)), the smallest and largest of that. Of rays with a common origin their slopes, directions on
-    /// the other two axes over `depth`.
+    /// Where a ray crosses a plane across the axis ([`Pencil`](super::pencil::Pencil)), the smallest and largest of
+    /// that. Of rays with a common origin their slopes, directions on the other two axes over `depth`.
     pub across: [PerRay; 2],
     pub low: [f32; 2],
     pub high: [f32; 2],
@@ -142,8 +144,8 @@ impl Bundle {
         }
     }
 
-    /// Takes the rays of `world` in the coordinates of an object. They start, or end, in one point there, too; but need not run
-    /// into one octant. True if they fit as a whole.
+    /// Takes the rays of `world` in the coordinates of an object. They start, or end, in one point there, too; but need
+    /// not run into one octant. True if they fit as a whole.
     #[inline(always)]
     pub fn place<S: Simd>(&mut self, world: &Self, place: &Place, range: &RayIntervals) -> bool {
         let (origin, blur) = place.point::<S>(Vec3::from_array(world.origin), world.blur);
@@ -181,8 +183,8 @@ impl Bundle {
         S::prefetch(ahead.wrapping_add(256 * 8));
         for (i, rays) in rays.as_chunks::<8>().0.iter().enumerate() {
             let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
-            // Some at a time, for they come from memory mostly, and more than a bundle ahead: all at once, before this one is traced, held up what
-            // the tree needs. A hint, whatever follows these rays.
+            // Some at a time, for they come from memory mostly, and more than a bundle ahead: all at once, before this
+            // one is traced, held up what the tree needs. A hint, whatever follows these rays.
             S::prefetch(ahead.wrapping_add(256 * i));
             let (origin, direction) = ([x, y, z], [dx, dy, dz]);
             for axis in 0..3 {
@@ -269,8 +271,8 @@ impl Bundle {
         (self.low, self.high) = ([low[0], low[1]], [high[0], high[1]]);
         self.largest = high[0].max(-low[0]).max(high[1].max(-low[1])).max(1.0);
         self.rows = Rows::new::<S>(&self.across);
-        // NaN and infinity, too: a direction whose smallest component vanishes against the others. In an object's coordinates
-        // a depth may be infinite, which leaves no slope.
+        // NaN and infinity, too: a direction whose smallest component vanishes against the others. In an object's
+        // coordinates a depth may be infinite, which leaves no slope.
         let is_small = high[2].max(-low[2]) < HUGE;
         if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
     }
@@ -291,7 +293,8 @@ impl Bundle {
         first.mul_add(down, less)
     }
 
-    /// What is so far from where each ray of a group starts, from the bundle's origin. Neither of both is below 0, so that the sum is not less precise than they are.
+    /// What is so far from where each ray of a group starts, from the bundle's origin. Neither of both is below 0, so
+    /// that the sum is not less precise than they are.
     #[inline(always)]
     pub fn beyond_start<S: Simd, P: Pencil>(&self, far: S::Wide, group: usize) -> S::Wide {
         if P::IS_PARALLEL { far.add(S::Wide::at(&self.start[2], group)) } else { far }
@@ -313,8 +316,9 @@ impl Bundle {
     /// Whether products of three lengths, as of corners and edges, may leave f32 in a tree that reaches that far.
     #[inline(always)]
     pub fn may_overflow<P: Pencil>(&self, reach: Vec3) -> bool {
-        // Components of a normal are two products of edges, which are at most twice as long as corners are far; its scalar product
-        // with a corner or a direction is three: 24, and rounding. Shadows are twice as large, and their rays' points may be as far away as corners.
+        // Components of a normal are two products of edges, which are at most twice as long as corners are far; its
+        // scalar product with a corner or a direction is three: 24, and rounding. Shadows are twice as large, and their
+        // rays' points may be as far away as corners.
         let far = (Vec3::from_array(self.origin).abs() + reach).max_element();
         if P::IS_PARALLEL {
             let far = far + self.widest();

@@ -1,4 +1,5 @@
-//! The rays of a bundle row by row, eight rows of eight: what tells most of them at once that a triangle does not concern them.
+//! The rays of a bundle row by row, eight rows of eight: what tells most of them at once that a triangle does not
+//! concern them.
 
 use crate::trace::bvh::simd::{Array, PerRay, RAYS, Simd, Vector};
 

@@ -1,18 +1,22 @@
 //! Rays of a bundle one by one, each against eight triangles at once: for leaves that few of them enter.
 //!
-//! Where triangles are smaller than pixels, eight of them concern a ray or two each, and to make their edges ready for 64 rays
-//! ([`Edges`](super::edges::Edges)) costs more than all the tests that follow. A ray's own test ([`Sides`]) shears the
-//! corners by the ray's slopes, which are at hand, from the origin that all share. Of turned rays, which share their end, it takes
-//! the ray's own origin instead: it lies on a surface as a rule, and from the far end nobody could tell on which side. So it does of parallel rays.
+//! Where triangles are smaller than pixels, eight of them concern a ray or two each, and to make their edges ready for
+//! 64 rays ([`Edges`](super::edges::Edges)) costs more than all the tests that follow. A ray's own test ([`Sides`])
+//! shears the corners by the ray's slopes, which are at hand, from the origin that all share. Of turned rays, which
+//! share their end, it takes the ray's own origin instead: it lies on a surface as a rule, and from the far end nobody
+//! could tell on which side. So it does of parallel rays.
 //!
-//! **Edge functions.** Slopes are off by as much as a single ray's shear in the world, and in an object's coordinates by 2 u of
-//! themselves and u / 4 besides (u = 2^-24; [`Bundle`]). The bounds of [`Sides`] hold for any shear k, but that an origin that is
-//! off by b counts as (1 + k) b, not 2 b. With k up to 16 the functions may overflow for triangles that are hit; then they say nothing.
+//! **Edge functions.** Slopes are off by as much as a single ray's shear in the world, and in an object's coordinates
+//! by 2 u of themselves and u / 4 besides (u = 2^-24; [`Bundle`]). The bounds of [`Sides`] hold for any shear k, but
+//! that an origin that is off by b counts as (1 + k) b, not 2 b. With k up to 16 the functions may overflow for
+//! triangles that are hit; then they say nothing.
 //!
-//! **t'.** In the world it is the mean of the corners' depths, with the bounds that it has there, and planes are asked only where these are not precise,
-//! as for a ray that starts on one. In an object's coordinates that is so for most rays, and planes are asked at once: height over slope. With N the normal
-//! computed with all signs positive, and |d| <= D on the bundle's axes, d being (p, q, 1): N is off by 4 u of itself, d by 4.25 u D at most, and the slope,
-//! with its products and sums, by 12 u N D; a corner relative to the origin by u and b, and the height by 10 u N times that, and b N.
+//! **t'.** In the world it is the mean of the corners' depths, with the bounds that it has there, and planes are asked
+//! only where these are not precise, as for a ray that starts on one. In an object's coordinates that is so for most
+//! rays, and planes are asked at once: height over slope. With N the normal computed with all signs positive, and |d|
+//! <= D on the bundle's axes, d being (p, q, 1): N is off by 4 u of itself, d by 4.25 u D at most, and the slope, with
+//! its products and sums, by 12 u N D; a corner relative to the origin by u and b, and the height by 10 u N times that,
+//! and b N.
 
 use super::found::DONE;
 use super::pencil::Pencil;
@@ -217,9 +221,9 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
         [x - dx.0[ray], y - dy.0[ray], z - dz.0[ray]]
     }
 
-    /// How far rays may be off, as [`Sides`] counts it. In the world they are as they were given, turned ones from their own
-    /// origins, too. In an object's coordinates these are told from the common end, and the difference rounds by less than the
-    /// blur, which has room for the rounding of both already.
+    /// How far rays may be off, as [`Sides`] counts it. In the world they are as they were given, turned ones from
+    /// their own origins, too. In an object's coordinates these are told from the common end, and the difference rounds
+    /// by less than the blur, which has room for the rounding of both already.
     #[inline(always)]
     fn blur(&self) -> Blur {
         if P::IS_PARALLEL || self.place == FIXED {

@@ -15,8 +15,8 @@ pub(super) struct BundleSlab {
     /// What is subtracted from them: the origin, and the pad.
     near_origin: [f32; 3],
     far_origin: [f32; 3],
-    /// By what planes across the first two axes are multiplied before they are held against rays, in a parallel bundle; and the ends of what they are
-    /// held against.
+    /// By what planes across the first two axes are multiplied before they are held against rays, in a parallel bundle;
+    /// and the ends of what they are held against.
     scale: [f32; 2],
     ends: [[f32; 2]; 2],
     forward: f32,
@@ -62,9 +62,9 @@ impl BundleSlab {
             forward: bundle.forward,
         };
         for (i, axis) in axes(bundle.axis).into_iter().enumerate() {
-            // Origin and box are subtracted (2 u of both), the slope is off by 2 u (in an object's coordinates by
-            // 4.25 u), its reciprocal and the product by another each, or by the least number that there is; or, of a parallel bundle, the difference by another.
-            // What of that is relative to the box is in the box.
+            // Origin and box are subtracted (2 u of both), the slope is off by 2 u (in an object's coordinates by 4.25
+            // u), its reciprocal and the product by another each, or by the least number that there is; or, of a
+            // parallel bundle, the difference by another. What of that is relative to the box is in the box.
             const { assert!(10.0 * UNIT_ROUNDOFF < WIDENED + WIDENED_ALL) };
             let origin = bundle.origin[axis];
             let pad = sign[i] * (10.0 * UNIT_ROUNDOFF * origin.abs() + stray + f32::MIN_POSITIVE);
@@ -94,8 +94,8 @@ impl BundleSlab {
         boxes
     }
 
-    /// The children that some ray of the bundle may enter with t' up to `limit`, as a bit mask; and where it enters each at the
-    /// earliest.
+    /// The children that some ray of the bundle may enter with t' up to `limit`, as a bit mask; and where it enters
+    /// each at the earliest.
     #[inline(always)]
     pub fn enter<S: Simd, P: Pencil>(&self, boxes: &Boxes, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
         let splat = S::V8::splat;

@@ -1,5 +1,5 @@
-//! A bundle among the triangles of a tree: at leaves that more than a few rays enter it meets all triangles at once ([`Meeting`]), at others its
-//! rays are tested one by one ([`super::single`]).
+//! A bundle among the triangles of a tree: at leaves that more than a few rays enter it meets all triangles at once
+//! ([`Meeting`]), at others its rays are tested one by one ([`super::single`]).
 
 use std::marker::PhantomData;
 
@@ -23,7 +23,8 @@ use crate::trace::bvh::tree::Tree;
 /// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
 const FEW: u32 = 8;
 
-/// [`FEW`] in a tree that reaches that far. [`Edges`](super::edges::Edges) must not overflow; where they might, every ray is by itself.
+/// [`FEW`] in a tree that reaches that far. [`Edges`](super::edges::Edges) must not overflow; where they might, every
+/// ray is by itself.
 #[inline(always)]
 pub(super) fn few<P: Pencil>(bundle: &Bundle, reach: Vec3) -> u32 {
     if bundle.may_overflow::<P>(reach) { RAYS as u32 } else { FEW }
@@ -88,8 +89,8 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
         changed
     }
 
-    /// Of rays from `ray` on, a bit each, that hit triangle `id` for sure: those whose noted triangle is seen to lie in one plane with it, so that nothing is left to be decided. Noted is then
-    /// whichever counts.
+    /// Of rays from `ray` on, a bit each, that hit triangle `id` for sure: those whose noted triangle is seen to lie in
+    /// one plane with it, so that nothing is left to be decided. Noted is then whichever counts.
     #[cold]
     #[inline(never)]
     pub(super) fn settle(&mut self, id: u32, ray: usize, mut sure: u32) -> u32 {

@@ -1,7 +1,8 @@
-//! A bundle's way through a tree: each node's boxes against the rectangle of all slopes, and each box that this enters against all rays.
+//! A bundle's way through a tree: each node's boxes against the rectangle of all slopes, and each box that this enters
+//! against all rays.
 //!
-//! No branch says which rays enter a box: it is told of all 64, whoever matters. To stop at the first, or to ask rows of rays before, took fewer
-//! instructions and more time (docs/PERFORMANCE.md).
+//! No branch says which rays enter a box: it is told of all 64, whoever matters. To stop at the first, or to ask rows
+//! of rays before, took fewer instructions and more time (docs/PERFORMANCE.md).
 
 use std::hint::select_unpredictable;
 use std::marker::PhantomData;

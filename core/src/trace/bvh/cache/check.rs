@@ -1,18 +1,20 @@
 //! Whether a tree that was read is a tree over just these triangles.
 //!
-//! A digest finds damage; it does not tell whether who wrote the file was right, or meant well. So nothing is taken on trust that
-//! a ray will rely on:
+//! A digest finds damage; it does not tell whether who wrote the file was right, or meant well. So nothing is taken on
+//! trust that a ray will rely on:
 //!
 //! - every node but the root has one parent, which comes before it: no cycles, nothing unreachable; and the tree is no
 //!   deeper than the stack of a walk;
-//! - every box is finite and holds the boxes of the node below it, or the triangles of its leaf, [`widened`]; slots without a child are empty;
+//! - every box is finite and holds the boxes of the node below it, or the triangles of its leaf, [`widened`]; slots
+//!   without a child are empty;
 //! - every block is in one leaf, names triangles of the mesh, and has their corners;
-//! - every triangle that can be hit is in a leaf. In the high preset the leaves that name it hold all pieces that it is cut into:
-//!   these are cut once more, which takes as long as it did, so that such a tree is read in little less time than it is built where much is cut.
+//! - every triangle that can be hit is in a leaf. In the high preset the leaves that name it hold all pieces that it is
+//!   cut into: these are cut once more, which takes as long as it did, so that such a tree is read in little less time
+//!   than it is built where much is cut.
 //!
-//! What passes gives the hits that a tree built anew gives. It takes a tenth of the time to build: one pass over nodes and
-//! triangles, by all threads. Marks are plain stores and counts are compared in the end, for atomic exchanges took as
-//! long as everything else.
+//! What passes gives the hits that a tree built anew gives. It takes a tenth of the time to build: one pass over nodes
+//! and triangles, by all threads. Marks are plain stores and counts are compared in the end, for atomic exchanges took
+//! as long as everything else.
 
 use std::ops::Range;
 use std::result::Result;

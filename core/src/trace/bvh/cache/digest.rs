@@ -1,8 +1,9 @@
 //! Digests of large arrays, by all threads: each stretch has its own, and these are digested in order.
 //!
-//! XXH3 (Collet 2019, *xxHash: extremely fast non-cryptographic hash algorithm*), 128 bits, finds damage and tells meshes
-//! apart at the speed of memory. It does not withstand whoever looks for two meshes of one digest, and need not: what a file
-//! holds is compared with the mesh as well (`check`). A cryptographic digest would take longer than the rest of the reading.
+//! XXH3 (Collet 2019, *xxHash: extremely fast non-cryptographic hash algorithm*), 128 bits, finds damage and tells
+//! meshes apart at the speed of memory. It does not withstand whoever looks for two meshes of one digest, and need not:
+//! what a file holds is compared with the mesh as well (`check`). A cryptographic digest would take longer than the
+//! rest of the reading.
 
 use rayon::prelude::*;
 use twox_hash::XxHash3_128;
@@ -27,8 +28,8 @@ pub(super) fn of(bytes: &[u8]) -> Digest {
     of_few(stretches.as_flattened())
 }
 
-/// Of all that decides the trees over the triangles of `levels`: positions as traced, corners, the order of the parts, and how
-/// trees are built. Neither threads nor instruction sets decide anything.
+/// Of all that decides the trees over the triangles of `levels`: positions as traced, corners, the order of the parts,
+/// and how trees are built. Neither threads nor instruction sets decide anything.
 pub(super) fn of_levels(levels: &[&[Part]], preset: Preset) -> Digest {
     let mut words = preset.name().as_bytes().to_vec();
     for parts in levels {

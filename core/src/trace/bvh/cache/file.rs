@@ -6,8 +6,8 @@
 //! arrays        in order, each at the next multiple of 64, zeros between
 //! ```
 //!
-//! Where an array lies follows from the lengths before it, so nothing can overlap or point out of the file. Numbers are as
-//! the processor has them, so that arrays are used where they lie; a file of another byte order is refused.
+//! Where an array lies follows from the lengths before it, so nothing can overlap or point out of the file. Numbers are
+//! as the processor has them, so that arrays are used where they lie; a file of another byte order is refused.
 
 use std::fs::File;
 use std::io::Write;
@@ -80,7 +80,8 @@ impl Header {
     }
 }
 
-/// Where arrays of these lengths lie, behind a table of them, and the length of the file; none where that is more than can be.
+/// Where arrays of these lengths lie, behind a table of them, and the length of the file; none where that is more than
+/// can be.
 fn places(lengths: impl ExactSizeIterator<Item = u64>) -> Option<(Vec<Range<usize>>, usize)> {
     let mut end = size_of::<Header>().checked_add(lengths.len().checked_mul(size_of::<Entry>())?)?;
     let mut places = Vec::with_capacity(lengths.len());
@@ -130,8 +131,8 @@ pub(super) struct Arrays {
 }
 
 impl Arrays {
-    /// Checks that a file is of this format and `key`, has `arrays` arrays, and is as it was written; none where there is no
-    /// file.
+    /// Checks that a file is of this format and `key`, has `arrays` arrays, and is as it was written; none where there
+    /// is no file.
     ///
     /// # Errors
     /// What is wrong with it.

@@ -6,13 +6,13 @@
 //! | `file` | arrays in a file, and what can be wrong with one |
 //! | `check` | whether a tree that was read is one over these triangles |
 //!
-//! A file is for one world: the trees over the triangles of all its levels, by a digest of the triangles as traced and of the
-//! preset. Those over shapes and placements are small and built anew, so that objects may move, and cameras, lights and
-//! materials change, without another file. A file for each mesh, the alternative, could be shared between scenes, and would
-//! make ten thousand files of a city.
+//! A file is for one world: the trees over the triangles of all its levels, by a digest of the triangles as traced and
+//! of the preset. Those over shapes and placements are small and built anew, so that objects may move, and cameras,
+//! lights and materials change, without another file. A file for each mesh, the alternative, could be shared between
+//! scenes, and would make ten thousand files of a city.
 //!
-//! The file is mapped and used where it lies. It is not trusted: a damaged or foreign one gives a warning, is ignored, and is
-//! written anew.
+//! The file is mapped and used where it lies. It is not trusted: a damaged or foreign one gives a warning, is ignored,
+//! and is written anew.
 
 mod check;
 mod digest;

@@ -14,7 +14,8 @@ pub(in crate::trace::bvh) struct Addresses {
 impl Addresses {
     pub fn new<S: Simd>(tree: &Tree, leaves: *const u8, stride: usize) -> Self {
         let nodes = S::address(tree.nodes(), 0);
-        // Whoever has arrived has no next. An address outside of what is there would be looked up in vain, which holds up all that follows.
+        // Whoever has arrived has no next. An address outside of what is there would be looked up in vain, which holds
+        // up all that follows.
         Self { first: [nodes, leaves, nodes], stride: [size_of::<Node>(), stride, 0] }
     }
 

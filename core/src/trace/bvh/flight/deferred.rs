@@ -1,4 +1,5 @@
-//! Rays that bundles leave to placed objects each by itself: a few of them of many a bundle make a flight, where each bundle's own would be too few.
+//! Rays that bundles leave to placed objects each by itself: a few of them of many a bundle make a flight, where each
+//! bundle's own would be too few.
 
 use std::cell::Cell;
 

@@ -2,21 +2,23 @@
 //!
 //! A single ray's walk ([`super::walk`]) is bound by latency, not by work: each step needs the node that the one before
 //! has chosen, and how many children are entered is anyone's guess, so every other node is mispredicted. Here a round
-//! gives every ray of the flight one step, but those that wait at placements. Steps of different rays do not depend on each other, and what can be is told without
-//! branches: who is at a node, at a leaf, or has arrived, by masks of what all of them reach next; which child of a node comes first, by
-//! minima; and at a leaf all rays look on which sides of edges they pass ([`LeafTest`]) before
-//! those that may pass within a triangle are gone through again. A branch there, taken for every other leaf, cost an eighth of the time, for
-//! when it turns out to be wrong all that follows has been done in vain. What a ray reaches next is fetched while the others take their turn.
+//! gives every ray of the flight one step, but those that wait at placements. Steps of different rays do not depend on
+//! each other, and what can be is told without branches: who is at a node, at a leaf, or has arrived, by masks of what
+//! all of them reach next; which child of a node comes first, by minima; and at a leaf all rays look on which sides of
+//! edges they pass ([`LeafTest`]) before those that may pass within a triangle are gone through again. A branch there,
+//! taken for every other leaf, cost an eighth of the time, for when it turns out to be wrong all that follows has been
+//! done in vain. What a ray reaches next is fetched while the others take their turn.
 //!
 //! Only when a hit shortens the ray is its stack gone through; so what is on it is always to be visited.
 //!
-//! **Placed objects.** A ray that comes to a placement goes on in the object's tree, in the object's coordinates, on the same
-//! stack: t is the same there, so a hit shortens what waits above as well. Walking the object's tree alone, there and
-//! then, would be bound by latency again. To make it ready for the object costs as much as several nodes, but eight together, each for an object of its own, not much
-//! more than one: so whoever comes to a placement waits until half of the flight does, or nobody else has a step to take.
+//! **Placed objects.** A ray that comes to a placement goes on in the object's tree, in the object's coordinates, on
+//! the same stack: t is the same there, so a hit shortens what waits above as well. Walking the object's tree alone,
+//! there and then, would be bound by latency again. To make it ready for the object costs as much as several nodes, but
+//! eight together, each for an object of its own, not much more than one: so whoever comes to a placement waits until
+//! half of the flight does, or nobody else has a step to take.
 //!
-//! **Deferred rays.** Bundles of rays that look for any hit leave some to placed objects each by itself ([`trace_deferred`]). Those of several bundles set out
-//! together, in the objects' coordinates from the beginning.
+//! **Deferred rays.** Bundles of rays that look for any hit leave some to placed objects each by itself
+//! ([`trace_deferred`]). Those of several bundles set out together, in the objects' coordinates from the beginning.
 
 pub(super) mod addresses;
 mod deferred;
@@ -56,7 +58,8 @@ const RAYS: usize = IN_FLIGHT;
 /// Room for a flight.
 pub(super) struct Flight {
     states: [RayState; RAYS],
-    /// What each reaches next; [`Child::NONE`] of one that has arrived, or waits to return from an object or from the fixed triangles.
+    /// What each reaches next; [`Child::NONE`] of one that has arrived, or waits to return from an object or from the
+    /// fixed triangles.
     next: [Child; RAYS],
     /// Where it does.
     tree_id: [TreeId; RAYS],
@@ -78,7 +81,8 @@ impl Flight {
         S::prefetch(target.address(tree_id, next));
     }
 
-    /// Those at placements go into them, made ready eight at a time; of fewer than [`MANY`] each by itself, if there is `all_waiting`.
+    /// Those at placements go into them, made ready eight at a time; of fewer than [`MANY`] each by itself, if
+    /// `all_waiting`: no other ray has a step to take.
     #[inline(always)]
     fn descend<S: Simd, G: TraversalTarget>(
         &mut self,
@@ -110,7 +114,8 @@ impl Flight {
         }
     }
 
-    /// Up to eight of those at placements made ready for the objects, in their order, and a bit for each for which that could be done.
+    /// Up to eight of those at placements made ready for the objects, in their order, and a bit for each for which that
+    /// could be done.
     #[inline(always)]
     fn ready_in_places<S: Simd>(&self, group: Set, bvh: &Bvh, rays: &[Ray]) -> ([ReadyRay; 8], u32) {
         let mut others = group;
@@ -228,7 +233,8 @@ pub(super) fn trace<S: Simd, Q: Query>(
     }
 }
 
-/// The same among the fixed triangles alone, where they, or the rays, are rounded from those that are meant; `decide` knows these.
+/// The same among the fixed triangles alone, where they, or the rays, are rounded from those that are meant; `decide`
+/// knows these.
 #[inline(always)]
 pub(super) fn trace_rounded<S: Simd, Q: Query>(
     flight: &mut Flight,
@@ -272,7 +278,8 @@ pub(super) fn trace_deferred<S: Simd, Q: Query>(
     );
 }
 
-/// Runs as a function of its own ([`Simd::apart_narrow`]), so `source` and `done` are of no instruction set, or of one that is narrow.
+/// Runs as a function of its own ([`Simd::apart_narrow`]), so `source` and `done` are of no instruction set, or of one
+/// that is narrow.
 #[inline(always)]
 fn run<S: Simd, Q: Query, G: TraversalTarget>(
     flight: &mut Flight,

@@ -19,8 +19,8 @@ use crate::trace::bvh::reject::ready::ReadyRay;
 use crate::trace::bvh::reject::woop::Sides;
 use crate::trace::bvh::simd::{Mask, Simd};
 
-/// Places on a stack: every level of a tree leaves at most seven siblings waiting; an object's tree stands upon that of the
-/// placements, and each has [`Child::NONE`] at its bottom.
+/// Places on a stack: every level of a tree leaves at most seven siblings waiting; an object's tree stands upon that of
+/// the placements, and each has [`Child::NONE`] at its bottom.
 const STACK: usize = 512;
 
 const _: () = assert!(2 * MAX_DEPTH * (WIDTH - 1) + 3 < STACK);
@@ -70,16 +70,18 @@ pub(super) struct RayState {
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
     pub found: Found,
-    /// Children waiting to be visited. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is
-    /// stored beside.
+    /// Children waiting to be visited. Of two that a node leaves waiting the nearer is on top; of more nobody says
+    /// which. Above the top is room for what is stored beside.
     stack: AlignedStack<Child>,
-    /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
+    /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where
+    /// order does not matter.
     near: AlignedStack<u32>,
     /// For queries that leave doubts to the caller.
     pub listed: Listed,
 }
 
-/// As many lines from one state to the next let those that steps need fall into different sets of a cache of 64 sets: four of 32 states in one at most.
+/// As many lines from one state to the next let those that steps need fall into different sets of a cache of 64 sets:
+/// four of 32 states in one at most.
 #[cfg(target_pointer_width = "64")]
 const _: () = assert!(size_of::<RayState>() == 78 * 64);
 
@@ -117,8 +119,8 @@ impl RayState {
         near: AlignedStack([0; STACK + WIDTH]),
     };
 
-    /// Sets out with a ray of its own, for the root of the tree in which it starts; from the fixed triangles, where there are placements, then for
-    /// theirs. What it reaches next: that root.
+    /// Sets out with a ray of its own, for the root of the tree in which it starts; from the fixed triangles, where
+    /// there are placements, then for theirs. What it reaches next: that root.
     #[inline(always)]
     pub fn start<Q: Query, G: TraversalTarget>(
         &mut self,
@@ -237,7 +239,8 @@ impl RayState {
         (self.found.limit < limit).then(
             #[inline(always)]
             || {
-                // What it has come to may be beyond the limit, too, if it is from the stack, above whose top it is still.
+                // What it has come to may be beyond the limit, too, if it is from the stack, above whose top it is
+                // still.
                 self.len += usize::from(leaf.count() == 1);
                 self.shorten::<S>();
                 self.pass(leaf)
@@ -282,7 +285,8 @@ impl RayState {
         self.stack[self.len % STACK]
     }
 
-    /// Leaves out what is beyond the limit: eight at a time, which are most often all there are, so that nobody has to guess how many.
+    /// Leaves out what is beyond the limit: eight at a time, which are most often all there are, so that nobody has to
+    /// guess how many.
     #[inline(always)]
     fn shorten<S: Simd>(&mut self) {
         let (len, mut kept) = (self.len % STACK, 1);

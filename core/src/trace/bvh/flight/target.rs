@@ -135,8 +135,8 @@ impl TraversalTarget for Rounded<'_> {
     }
 }
 
-/// The triangles of the world and of objects in their places: what each tree has, in one table, since rays of a round are in
-/// different ones, and nobody can predict which.
+/// The triangles of the world and of objects in their places: what each tree has, in one table, since rays of a round
+/// are in different ones, and nobody can predict which.
 pub(super) struct Placed<'a>(Vec<Region<'a>>);
 
 /// What a tree has.

@@ -1,9 +1,10 @@
 //! Triangles of one plane, told at a glance.
 //!
-//! Where surfaces lie on each other, every ray that hits one hits the other at exactly the same t, and the lower id counts. Bounds
-//! cannot tell that, and exact arithmetic ([`Distance::order`](crate::shape::distance::Distance::order)) takes many times as long as the rest of a
-//! ray. But nearly all such surfaces show it by their corners: faces that a file holds twice, turned or not, have the same three; floors, walls and
-//! decals on them share a coordinate. What does not show it is left to exact arithmetic.
+//! Where surfaces lie on each other, every ray that hits one hits the other at exactly the same t, and the lower id
+//! counts. Bounds cannot tell that, and exact arithmetic ([`Distance::order`](crate::shape::distance::Distance::order))
+//! takes many times as long as the rest of a ray. But nearly all such surfaces show it by their corners: faces that a
+//! file holds twice, turned or not, have the same three; floors, walls and decals on them share a coordinate. What does
+//! not show it is left to exact arithmetic.
 
 use super::found::NONE;
 use crate::math::{Affine3, Vec3};
@@ -21,8 +22,8 @@ pub(in crate::trace::bvh) struct Spot {
 }
 
 impl Bvh {
-    /// Of a triangle that is noted and another that the ray hits for sure, too, the one that counts, where they are seen to lie in one plane. Bounds on
-    /// the t of either hold for both. None if none is noted.
+    /// Of a triangle that is noted and another that the ray hits for sure, too, the one that counts, where they are
+    /// seen to lie in one plane. Bounds on the t of either hold for both. None if none is noted.
     #[cold]
     #[inline(never)]
     pub(in crate::trace::bvh) fn first_of_plane(&self, noted: Spot, other: Spot) -> Option<Spot> {

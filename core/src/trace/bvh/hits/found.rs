@@ -1,8 +1,8 @@
 //! What a single ray has hit so far among triangles: for the most part only noted.
 //!
-//! The reject test ([`crate::trace::bvh::reject::filter`]) knows bounds on t. Where they leave no doubt that a triangle is hit, and is the
-//! nearest, its number will do; t, u and v are computed once, of what remains in the end. Where they leave doubt,
-//! [`triangle::intersect`](crate::shape::triangle::intersect) decides at once.
+//! The reject test ([`crate::trace::bvh::reject::filter`]) knows bounds on t. Where they leave no doubt that a triangle
+//! is hit, and is the nearest, its number will do; t, u and v are computed once, of what remains in the end. Where they
+//! leave doubt, [`triangle::intersect`](crate::shape::triangle::intersect) decides at once.
 
 use super::coplanar::Spot;
 use super::listed::Listed;
@@ -48,15 +48,15 @@ impl Found {
         computed: NONE,
     };
 
-    /// Nothing yet, up to the ray's tmax, and that rounded up. What lies so far that t overflows is in doubt, whose decision is that it is not
-    /// hit.
+    /// Nothing yet, up to the ray's tmax, and that rounded up. What lies so far that t overflows is in doubt, whose
+    /// decision is that it is not hit.
     #[inline(always)]
     pub fn start(&mut self, [tmax, limit]: [f32; 2]) {
         (self.sure, self.limit, self.noted, self.is_computed) = (tmax.min(f32::MAX), limit, NONE, false);
     }
 
-    /// Notes a triangle that is hit for sure between `low` and `high`, if it is for sure within the range, and nearer than what was
-    /// noted before. Whether it was.
+    /// Notes a triangle that is hit for sure between `low` and `high`, if it is for sure within the range, and nearer
+    /// than what was noted before. Whether it was.
     #[inline(always)]
     pub fn note(&mut self, id: u32, [low, high]: [f32; 2], tmin: f32) -> bool {
         let is_nearest = tmin <= low && high <= self.sure;
@@ -67,8 +67,9 @@ impl Found {
         is_nearest
     }
 
-    /// Lists a triangle that is hit for sure between `low` and `high`, if it is for sure within the ray's range and may be the nearest: alone where it is that for sure, with its rivals where bounds
-    /// do not tell. False where it may be out of range.
+    /// Lists a triangle that is hit for sure between `low` and `high`, if it is for sure within the ray's range and may
+    /// be the nearest: alone where it is that for sure, with its rivals where bounds do not tell. False where it may be
+    /// out of range.
     #[inline(always)]
     pub fn list(&mut self, listed: &mut Listed, id: u32, [low, high]: [f32; 2], ray: &Ray) -> bool {
         if low > self.limit {
@@ -208,8 +209,8 @@ mod tests {
     use crate::math::Vec3;
     use crate::trace::bvh::random::Random;
 
-    /// Hits with bounds around their t, in any order: the nearest is listed, alone where bounds tell it from all others, and nobody who is behind one that came before for sure; or a bound is
-    /// out of range, and that is said.
+    /// Hits with bounds around their t, in any order: the nearest is listed, alone where bounds tell it from all
+    /// others, and nobody who is behind one that came before for sure; or a bound is out of range, and that is said.
     #[test]
     fn the_nearest_is_always_listed() {
         let mut random = Random::new(1);

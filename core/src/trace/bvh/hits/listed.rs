@@ -1,4 +1,5 @@
-//! What a single ray hits among triangles, for whoever decides it by the corners that are meant ([`crate::trace::bvh::certain`]).
+//! What a single ray hits among triangles, for whoever decides it by the corners that are meant
+//! ([`crate::trace::bvh::certain`]).
 
 use super::found::NONE;
 

@@ -1,5 +1,6 @@
-//! What rays have hit: noted by number while they travel ([`found`]), or listed for whoever decides by other corners ([`listed`]),
-//! told apart where surfaces lie on each other ([`coplanar`]), and computed several at a time in the end ([`noted`], [`quad`]).
+//! What rays have hit: noted by number while they travel ([`found`]), or listed for whoever decides by other corners
+//! ([`listed`]), told apart where surfaces lie on each other ([`coplanar`]), and computed several at a time in the end
+//! ([`noted`], [`quad`]).
 
 pub(super) mod coplanar;
 pub(super) mod found;

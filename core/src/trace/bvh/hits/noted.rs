@@ -1,5 +1,5 @@
-//! Hits that are noted, four at a time: t, u and v of triangles that rays hit for sure, among the fixed ones or in placed
-//! objects.
+//! Hits that are noted, four at a time: t, u and v of triangles that rays hit for sure, among the fixed ones or in
+//! placed objects.
 
 use super::quad::{Quad, QuadHits, Seen};
 use crate::math::Vec3;
@@ -71,8 +71,8 @@ impl FourHits {
 impl TriangleTree {
     /// The hits of four rays, each of which hits a triangle for sure; `ids` as in [`Self::offer_one`].
     ///
-    /// The caller knows that f64 is precise enough for what [`triangle::intersect`](crate::shape::triangle::intersect) would
-    /// answer.
+    /// The caller knows that f64 is precise enough for what [`triangle::intersect`](crate::shape::triangle::intersect)
+    /// would answer.
     #[inline(always)]
     pub fn hits<S: Simd>(&self, rays: &Rays<S::D4>, ids: [u32; 4]) -> FourHits {
         let (mut a, mut b, mut c, mut d) = (None, None, None, None);
@@ -106,7 +106,8 @@ impl TriangleTree {
     }
 }
 
-/// A triangle that is hit by several rays: what they have in common is looked up once, and computed once. It is known by its corners, or as seen from one origin.
+/// A triangle that is hit by several rays: what they have in common is looked up once, and computed once. It is known
+/// by its corners, or as seen from one origin.
 pub(in crate::trace::bvh) struct Shared<T> {
     /// The triangle's.
     pub id: u32,
@@ -161,8 +162,8 @@ impl Bvh {
         (&self.objects[place.object as usize].triangles, Some(place.through()))
     }
 
-    /// t in f64 and hits as of [`TriangleTree::hits`], for triangles of placed objects; and where f64 is not precise enough, exactly. Only lanes of
-    /// the mask matter.
+    /// t in f64 and hits as of [`TriangleTree::hits`], for triangles of placed objects; and where f64 is not precise
+    /// enough, exactly. Only lanes of the mask matter.
     #[inline(always)]
     pub(in crate::trace::bvh) fn placed_hits<S: Simd>(
         &self,

@@ -6,7 +6,8 @@ use crate::shape::triangle;
 use crate::trace::bvh::simd::doubles::{cross, dot, minus, size};
 use crate::trace::bvh::simd::{Array, Doubles};
 
-/// Four triangles, or one for all four, as seen from the origins of four rays: what a ray's direction makes the numbers of a hit with.
+/// Four triangles, or one for all four, as seen from the origins of four rays: what a ray's direction makes the numbers
+/// of a hit with.
 pub(in crate::trace::bvh) struct Seen<D> {
     /// Opposite to the second and third corner.
     sides: [[D; 3]; 2],
@@ -59,12 +60,12 @@ impl<D: Doubles> Quad<D> {
     }
 
     /// A bit for each triangle, of those that are hit for sure and whose corners were rounded in f64, for which
-    /// [`triangle::intersect`] decides by these numbers, without exact arithmetic. `slack` is at least what the errors of corners
-    /// are relative to.
+    /// [`triangle::intersect`] decides by these numbers, without exact arithmetic. `slack` is at least what the errors
+    /// of corners are relative to.
     ///
-    /// Its bounds, with largest components in place of all: let s be that of the edges, L of the corners relative to the
-    /// origin, d of the direction, k the slack, R its unit of rounding. A vector product of two differences
-    /// errs by no more than R C in each component, C = 2 (x (y + y') + x' y + R (x + x') (y + y')), sizes being x and y and
+    /// Its bounds, with largest components in place of all: let s be that of the edges, L of the corners relative to
+    /// the origin, d of the direction, k the slack, R its unit of rounding. A vector product of two differences errs by
+    /// no more than R C in each component, C = 2 (x (y + y') + x' y + R (x + x') (y + y')), sizes being x and y and
     /// slacks x' and y'. For L and s these are k and 2 k, for s and s 2 k both.
     #[inline(always)]
     pub fn is_certain(&self, origin: [D; 3], direction: [D; 3], [pa, pb, pc]: [[D; 3]; 3], slack: D) -> u32 {

@@ -7,9 +7,10 @@ use crate::trace::bvh::node::{Child, Node, WIDTH};
 use crate::trace::bvh::simd::{Array, Simd, Vector, everywhere};
 use crate::trace::bvh::tree::Tree;
 
-/// Children that wait while a tree is searched, and by how much each falls short, as [`Simd::nearest_apart`] tells it: the lowest three bits mean nothing, and without
-/// them it is a little less. Unlike where [points](crate::trace::bvh::near) wait, nobody goes through them when something farther is found: each is asked when it is its turn, since a
-/// search wants to know of those it comes to by how much they fall short.
+/// Children that wait while a tree is searched, and by how much each falls short, as [`Simd::nearest_apart`] tells it:
+/// the lowest three bits mean nothing, and without them it is a little less. Unlike where
+/// [points](crate::trace::bvh::near) wait, nobody goes through them when something farther is found: each is asked when
+/// it is its turn, since a search wants to know of those it comes to by how much they fall short.
 pub(in crate::trace::bvh) struct SupportStack {
     short: [u32; ENTRIES],
     child: [Child; ENTRIES],
@@ -62,10 +63,11 @@ fn short(key: u32) -> f32 {
 }
 
 impl Tree {
-    /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow, or nothing may be visited. `of_leaf` is that of a
-    /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches
-    /// farther than what has been found and the 256th part of the width, or so many nodes and leaves have been visited. `first` is a leaf
-    /// that is asked before all others, which is no visit, and then one of those that reach farthest: of ways that differ little, mostly the same. The bits
+    /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow, or nothing
+    /// may be visited. `of_leaf` is that of a leaf, as f32 rounds it, or infinite. Of each node the child is visited
+    /// first that may reach farthest, until nothing reaches farther than what has been found and the 256th part of the
+    /// width, or so many nodes and leaves have been visited. `first` is a leaf that is asked before all others, which
+    /// is no visit, and then one of those that reach farthest: of ways that differ little, mostly the same. The bits
     /// are the same whatever the instruction set, since trees are made of them.
     #[inline(always)]
     pub fn farthest<S: Simd>(
@@ -126,8 +128,9 @@ impl Tree {
             waiting.push(others);
             next = if nearest < least { Some((nearest, child)) } else { waiting.pop(least) };
         }
-        // Three products and two sums of what is farthest, their difference from another such sum, what is spared, and the other sum itself where they are held to differ by
-        // nothing: eight roundings, with as much again to spare; and products that underflow.
+        // Three products and two sums of what is farthest, their difference from another such sum, what is spared, and
+        // the other sum itself where they are held to differ by nothing: eight roundings, with as much again to spare;
+        // and products that underflow.
         f64::from(most) - f64::from(least) + f64::from(16.0 * UNIT_ROUNDOFF * size + f32::MIN_POSITIVE)
     }
 }

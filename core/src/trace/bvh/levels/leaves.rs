@@ -25,7 +25,8 @@ pub(in crate::trace::bvh) enum Leaves {
 const CHUNK: usize = 64;
 
 impl Leaves {
-    /// Makes the blocks of `tree`, whose leaves name ranges of `items`, triangles of `meshes`, and lets these name ranges of blocks instead.
+    /// Makes the blocks of `tree`, whose leaves name ranges of `items`, triangles of `meshes`, and lets these name
+    /// ranges of blocks instead.
     pub fn new(tree: &mut Tree, items: &[Record], meshes: Meshes, compact: bool) -> Self {
         if compact {
             let block =
@@ -86,8 +87,8 @@ impl Leaves {
         }
     }
 
-    /// The numbers of a block's triangles, and how many there are; none where it is not a block of triangles of `meshes` as it
-    /// would be made.
+    /// The numbers of a block's triangles, and how many there are; none where it is not a block of triangles of
+    /// `meshes` as it would be made.
     pub fn numbers(&self, index: u32, meshes: &Meshes) -> Option<([u32; LANES], usize)> {
         let (numbers, is_sound) = match self {
             Self::Blocks(blocks) => {
@@ -138,7 +139,8 @@ impl Leaves {
         }
     }
 
-    /// Takes the triangles of those parts that are gone out of some blocks; how many these were. None where the tree does not hold its triangles itself.
+    /// Takes the triangles of those parts that are gone out of some blocks; how many these were. None where the tree
+    /// does not hold its triangles itself.
     pub fn take_out(&mut self, is_gone: &[bool], blocks: &[u32]) -> Option<usize> {
         let Self::Blocks(own) = self else { return None };
         let (own, mut count) = (own.make_mut(), 0);
@@ -161,7 +163,8 @@ impl Leaves {
         }
     }
 
-    /// Triangle `id`: lane `id % 8` of block `id / 8`; `scratch` is where a block may be put together that has this one alone.
+    /// Triangle `id`: lane `id % 8` of block `id / 8`; `scratch` is where a block may be put together that has this one
+    /// alone.
     #[inline(always)]
     pub fn lane<'a>(&'a self, id: u32, scratch: &'a mut Option<Block>) -> Lane<'a> {
         let (index, lane) = ((id / LANES as u32) as usize, id as usize % LANES);

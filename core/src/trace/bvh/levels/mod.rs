@@ -63,8 +63,8 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// At least the scalar product of each of `ways` with any of its points, as [`Tree::farthest`](super::tree::Tree::farthest) finds it: best in an
-    /// order in which neighbours differ little.
+    /// At least the scalar product of each of `ways` with any of its points, as
+    /// [`Tree::farthest`](super::tree::Tree::farthest) finds it: best in an order in which neighbours differ little.
     pub fn farthest(&self, isa: Present, ways: &[Vec3], visits: usize, values: &mut [f64]) {
         isa::dispatch_narrow(isa, Farthest { level: self, ways, visits, values });
     }
@@ -111,8 +111,8 @@ impl Level {
         }
     }
 
-    /// Offers the shapes that `ray`, in the world, hits in this level, as `local`: the ray in this level's coordinates, whose
-    /// rounding is part of it.
+    /// Offers the shapes that `ray`, in the world, hits in this level, as `local`: the ray in this level's coordinates,
+    /// whose rounding is part of it.
     #[inline(always)]
     pub fn trace_shapes<S: Simd, Q: Query>(
         &self,

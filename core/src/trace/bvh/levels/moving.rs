@@ -1,7 +1,8 @@
 //! Objects that move: a tree of their own, over boxes that are where they are at the ray's time.
 //!
-//! A ray comes here by itself, after everything that stands still, and each object that it enters is put where it stands at that time. So
-//! bundles and flights, in which rays of many times would have to part, know of no time, and scenes without motion pay nothing for it.
+//! A ray comes here by itself, after everything that stands still, and each object that it enters is put where it
+//! stands at that time. So bundles and flights, in which rays of many times would have to part, know of no time, and
+//! scenes without motion pay nothing for it.
 
 use rayon::prelude::*;
 
@@ -63,7 +64,8 @@ impl MovingTree {
         &self.placements[number as usize]
     }
 
-    /// Calls `enter` with every object that the ray may meet, where it stands at that time; it gives how far the ray still looks.
+    /// Calls `enter` with every object that the ray may meet, where it stands at that time; it gives how far the ray
+    /// still looks.
     #[inline(always)]
     pub fn walk<S: Simd, Q: Query>(
         &self,

@@ -1,4 +1,5 @@
-//! Blocks that are there, or are put together from numbers of triangles, whose corners are fetched from the mesh, when one is asked for.
+//! Blocks that are there, or are put together from numbers of triangles, whose corners are fetched from the mesh, when
+//! one is asked for.
 
 use crate::math::{Aabb, Vec3};
 use crate::memory::Array;
@@ -15,7 +16,8 @@ pub(in crate::trace::bvh) trait Blocks {
     fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory it is.
     fn address<S: Simd>(&self, index: u32) -> *const u8;
-    /// The numbers, where corners are fetched from so far that it helps to have them loaded before: first the triangles of a block, then their vertices.
+    /// The numbers, where corners are fetched from so far that it helps to have them loaded before: first the triangles
+    /// of a block, then their vertices.
     #[inline(always)]
     fn far(&self) -> Option<&Numbers> {
         None
@@ -45,8 +47,8 @@ pub(in crate::trace::bvh) struct Numbers {
 /// Fills a block's lanes that have no triangle.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Bytes of meshes from which on their corners are fetched ahead: on nefertiti (2 MB) that costs diffuse rays a tenth, with 13 MB it gains as much, with 360 MB
-/// two thirds.
+/// Bytes of meshes from which on their corners are fetched ahead: on nefertiti (2 MB) that costs diffuse rays a tenth,
+/// with 13 MB it gains as much, with 360 MB two thirds.
 const FAR: usize = 8 << 20;
 
 /// A block of the numbers of up to eight triangles.

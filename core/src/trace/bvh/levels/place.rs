@@ -1,15 +1,16 @@
 //! An object in its place, and rays in its coordinates.
 //!
-//! A transform keeps volumes' signs (or turns all of them round), t, u and v. So a ray can be held against an object's own
-//! triangles in the object's coordinates, as long as it is known how far the ray that was computed is from the one
+//! A transform keeps volumes' signs (or turns all of them round), t, u and v. So a ray can be held against an object's
+//! own triangles in the object's coordinates, as long as it is known how far the ray that was computed is from the one
 //! that is meant: its [`Blur`]. Moving the triangles into the world instead would take as much memory as the scene
 //! without instances; moving every node's box, the other alternative, widens it.
 //!
-//! With A x + T the transform to the world, whose entries are f32 and exact, B the inverse and b the translation that were computed
-//! in f64, R = 1 - B A, and norms the largest sums of a row, or component: A^-1 = (1 - R)^-1 B, so that it differs from B by at
-//! most |R| / (1 - |R|) |B|. R is computed, which is off by gamma(5) |B| |A|, and so is b + B T, by gamma(5) |B| |T|. With q the
-//! sum of that quotient and gamma(8), the moved origin is off by q |B| (|o| + |T|) + |b + B T|, and the direction by q |B| |d|. Then
-//! both are rounded to f32. For a transform that is anywhere near a rotation only this last step counts.
+//! With A x + T the transform to the world, whose entries are f32 and exact, B the inverse and b the translation that
+//! were computed in f64, R = 1 - B A, and norms the largest sums of a row, or component: A^-1 = (1 - R)^-1 B, so that
+//! it differs from B by at most |R| / (1 - |R|) |B|. R is computed, which is off by gamma(5) |B| |A|, and so is b + B
+//! T, by gamma(5) |B| |T|. With q the sum of that quotient and gamma(8), the moved origin is off by q |B| (|o| + |T|) +
+//! |b + B T|, and the direction by q |B| |d|. Then both are rounded to f32. For a transform that is anywhere near a
+//! rotation only this last step counts.
 
 use crate::math::{Affine3, DAffine3, DMat3, UNIT_ROUNDOFF, Vec3, gamma64};
 use crate::ray::Ray;
@@ -20,7 +21,8 @@ use crate::trace::bvh::simd::{Array, Doubles, Mask, PerRay, RAYS, Simd, Vector, 
 use crate::trace::leaf::InstanceTransform;
 use crate::trace::world::object_ray;
 
-/// An object in its place, while it stands still. Rays on their way into the object need the first two cache lines, their hits the last two.
+/// An object in its place, while it stands still. Rays on their way into the object need the first two cache lines,
+/// their hits the last two.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(in crate::trace::bvh) struct Place {
@@ -38,9 +40,11 @@ pub(in crate::trace::bvh) struct Place {
     pub instance: u32,
     /// As of [`Placement`].
     pub to_world: Affine3,
-    /// At least what the error of a corner in the world is relative to: [`Corners::slack`](crate::shape::triangle::Corners::slack).
+    /// At least what the error of a corner in the world is relative to:
+    /// [`Corners::slack`](crate::shape::triangle::Corners::slack).
     pub slack: f64,
-    /// The [grain](super::triangles::TriangleTree::grain) of its triangles in the world, if [that of the object](Self::with_grain) was told.
+    /// The [grain](super::triangles::TriangleTree::grain) of its triangles in the world, if [that of the
+    /// object](Self::with_grain) was told.
     pub grain: f32,
 }
 
@@ -108,8 +112,8 @@ impl Place {
         }
     }
 
-    /// `ray` in the coordinates of what stands here, or as it is. No closure for `map_or`: the compiler need not inline that, and then makes it for
-    /// processors without the instructions of `S`.
+    /// `ray` in the coordinates of what stands here, or as it is. No closure for `map_or`: the compiler need not inline
+    /// that, and then makes it for processors without the instructions of `S`.
     #[inline(always)]
     pub fn local_or<S: Simd>(place: Option<&Self>, ray: &Ray) -> (Ray, Blur) {
         match place {
@@ -118,7 +122,8 @@ impl Place {
         }
     }
 
-    /// Eight rays, field by field as [`columns`](crate::trace::bvh::reject::ready::columns) has them, in the object's coordinates at the same t.
+    /// Eight rays, field by field as [`columns`](crate::trace::bvh::reject::ready::columns) has them, in the object's
+    /// coordinates at the same t.
     #[inline(always)]
     pub fn eight<S: Simd>(&self, world: [S::V8; 8]) -> EightRays<S::V8> {
         let splat = S::V8::splat;
@@ -241,13 +246,15 @@ pub(in crate::trace::bvh) struct EightRays<V> {
 }
 
 impl<V: Vector> EightRays<V> {
-    /// Rays in the world and in the object; how far the latter are off relative to origins and directions, and besides ([`Place::off`]).
+    /// Rays in the world and in the object; how far the latter are off relative to origins and directions, and besides
+    /// ([`Place::off`]).
     #[inline(always)]
     fn new(world: [V; 8], local: [V; 8], relative: V, absolute: V) -> Self {
         let splat = V::splat;
         let [x, y, z, dx, dy, dz, ..] = world;
         let [lx, ly, lz, lp, lq, lr, ..] = local;
-        // As [`Place::blur`], in f32, for which the hundredth more has room. Neither factor of a product is so small that it vanishes where the other is large.
+        // As [`Place::blur`], in f32, for which the hundredth more has room. Neither factor of a product is so small
+        // that it vanishes where the other is large.
         let largest = size([lp, lq, lr]);
         let ratio = size([dx, dy, dz]).div(largest).max(splat(f32::MIN_POSITIVE));
         let turn = ratio.mul_add(relative, splat(UNIT_ROUNDOFF));
@@ -266,8 +273,8 @@ fn row_times<S: Simd>([a, b, c]: [S::D4; 3], [x, y, z]: [S::D4; 3]) -> S::D4 {
     a.mul(x).add(b.mul(y)).add(c.mul(z))
 }
 
-/// Points and vectors, eight of each, times a matrix: its columns, and a translation that counts for points alone. Sums are added up in the order of
-/// [`DAffine3::transform_point3`].
+/// Points and vectors, eight of each, times a matrix: its columns, and a translation that counts for points alone. Sums
+/// are added up in the order of [`DAffine3::transform_point3`].
 #[inline(always)]
 pub(in crate::trace::bvh) fn eight_times<S: Simd>(
     [mx, my, mz, b]: &[[f64; 3]; 4],
@@ -398,8 +405,8 @@ mod tests {
         assert!(known > 2000 && unknown > 100, "{known} known, {unknown} not");
     }
 
-    /// From turned and scaled objects to shears that f64 all but loses: nowhere is a ray farther off than its blur says, and
-    /// for an object that is merely turned the blur is not much more than the rounding to f32.
+    /// From turned and scaled objects to shears that f64 all but loses: nowhere is a ray farther off than its blur
+    /// says, and for an object that is merely turned the blur is not much more than the rounding to f32.
     #[test]
     fn rays_are_no_farther_off_than_their_blur() {
         let mut random = Random::new(1);

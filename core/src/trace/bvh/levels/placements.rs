@@ -27,8 +27,8 @@ pub(in crate::trace::bvh) struct PlacementTree {
     spread: Spread,
 }
 
-/// A tree over those that stand still, and which each of them is, in the order of its leaves: one a leaf, for to enter an
-/// object costs many times what the test of its box does.
+/// A tree over those that stand still, and which each of them is, in the order of its leaves: one a leaf, for to enter
+/// an object costs many times what the test of its box does.
 fn tree_over(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> (Tree, Vec<usize>) {
     let stands = |placement: &Placement| placement.motion.is_none();
     let outlines = Outlines::new(objects, options.isa.demand(), placements.iter().filter(|it| stands(it)));
@@ -63,8 +63,8 @@ pub(in crate::trace::bvh) fn among_boxes<S: Simd>(tree: &Tree, ray: &Ray, spread
     SlabRay::new::<S>(ray, tree.reach(), strayed(ray, spread))
 }
 
-/// Calls `enter` with the number of every placement whose box the ray enters, or may enter where it strays by `spread`; it says how far
-/// the ray still looks.
+/// Calls `enter` with the number of every placement whose box the ray enters, or may enter where it strays by `spread`;
+/// it says how far the ray still looks.
 #[inline(always)]
 pub(in crate::trace::bvh) fn walk_over<S: Simd, Q: Query>(
     tree: &Tree,

@@ -1,8 +1,9 @@
-//! How far objects reach in any direction: their support functions (Rockafellar 1970, *Convex analysis*), for the boxes around them where they are placed.
+//! How far objects reach in any direction: their support functions (Rockafellar 1970, *Convex analysis*), for the boxes
+//! around them where they are placed.
 //!
-//! Of a box around a placed object each side is the object's support in one direction of its own coordinates. That of its own box
-//! would do, but is half as wide again for a ball that is turned. So the object's tree is searched for what lies farthest, down to
-//! corners, which takes a third of a microsecond and more.
+//! Of a box around a placed object each side is the object's support in one direction of its own coordinates. That of
+//! its own box would do, but is half as wide again for a ball that is turned. So the object's tree is searched for what
+//! lies farthest, down to corners, which takes a third of a microsecond and more.
 //!
 //! For an object that is placed often it is [tabulated](Table) instead.
 
@@ -15,8 +16,8 @@ use crate::trace::Placement;
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::simd::isa::{self, Kernel, Present};
 
-/// Nodes and leaves that are visited at most for all that is placed, so that many objects that are placed now and then do not take long;
-/// where objects hold shapes as well, as many again for these.
+/// Nodes and leaves that are visited at most for all that is placed, so that many objects that are placed now and then
+/// do not take long; where objects hold shapes as well, as many again for these.
 const ALL_VISITS: usize = 1 << 20;
 
 /// But no fewer than these for an entry of a table, which is worth it: each serves many placements.
@@ -96,7 +97,8 @@ fn searched<S: Simd>(level: &Level, rows: &DMat3, visits: usize) -> [DVec3; 2] {
     if visits == 0 {
         return [DVec3::INFINITY; 2];
     }
-    // Rows of a matrix of f32, so nothing is lost. They differ much; what one finds first is of little use to the next, and does no harm.
+    // Rows of a matrix of f32, so nothing is lost. They differ much; what one finds first is of little use to the next,
+    // and does no harm.
     let [x, y, z] = [0, 1, 2].map(|axis| rows.row(axis).as_vec3());
     let mut values = [0.0; 6];
     level.search::<S>(&[x, y, z, -x, -y, -z], visits, &mut values);
@@ -216,8 +218,8 @@ mod tests {
         assert!(bounds.half_area() < 0.95 * loose.half_area(), "{bounds:?} for {loose:?}");
     }
 
-    /// Every corner is within what is said to be farthest, however few nodes may be visited, at all sizes, of all ways together, on every instruction set; and with many visits
-    /// one of them is there.
+    /// Every corner is within what is said to be farthest, however few nodes may be visited, at all sizes, of all ways
+    /// together, on every instruction set; and with many visits one of them is there.
     #[test]
     fn nothing_is_farther_than_the_farthest() {
         let mut random = Random::new(5);
@@ -285,8 +287,9 @@ mod tests {
         DAffine3 { matrix3: turn * stretch, translation: random.vec3().as_dvec3() * 10.0 * size }
     }
 
-    /// Whatever is placed, however often, large or small, whether it moves: no point of it is outside its box, and the box is no larger than the one around the object's own box;
-    /// on one thread the same as on several, whatever the instruction set.
+    /// Whatever is placed, however often, large or small, whether it moves: no point of it is outside its box, and the
+    /// box is no larger than the one around the object's own box; on one thread the same as on several, whatever the
+    /// instruction set.
     #[test]
     fn boxes_hold_what_is_placed() {
         let mut random = Random::new(13);

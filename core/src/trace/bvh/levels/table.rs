@@ -1,7 +1,8 @@
 //! A support function that is tabulated, on a grid over the surface of a cube.
 //!
-//! A support function is convex, and as many times as large in a direction that is as many times as long: in a direction between three others it is at most what lies
-//! between their values. So a table never tells too little, and for a ball a 64th of its radius too much at most, or a 256th on the finer grid, besides what
+//! A support function is convex, and as many times as large in a direction that is as many times as long: in a
+//! direction between three others it is at most what lies between their values. So a table never tells too little, and
+//! for a ball a 64th of its radius too much at most, or a 256th on the finer grid, besides what
 //! [searches](crate::trace::bvh::tree::Tree::farthest) spare.
 
 use rayon::prelude::*;
@@ -13,7 +14,8 @@ use crate::trace::bvh::simd::{Doubles, Simd};
 pub(super) struct Table {
     /// Along each side of a face; a power of two, so that the grid is exact.
     cells: usize,
-    /// Face by face and row by row, one more than cells to a row; along and against. Faces are those of x, y, z, with the other axes in their order.
+    /// Face by face and row by row, one more than cells to a row; along and against. Faces are those of x, y, z, with
+    /// the other axes in their order.
     values: Vec<[f64; 2]>,
     /// More than rounding can add in a direction of which no component is larger than 1.
     spare: f64,
@@ -34,7 +36,8 @@ impl Table {
         2 * 3 * (cells + 1) * (cells + 1)
     }
 
-    /// Of a support function, which is asked for neighbours together, as [`Level::farthest`](super::Level::farthest) is.
+    /// Of a support function, which is asked for neighbours together, as [`Level::farthest`](super::Level::farthest)
+    /// is.
     pub fn new(cells: usize, support: impl Fn(&[Vec3], &mut [f64]) + Sync) -> Self {
         let side = cells + 1;
         let mut values = vec![[0.0; 2]; Self::entries(cells) / 2];
@@ -61,7 +64,8 @@ impl Table {
         Self { cells, values, spare }
     }
 
-    /// At least the support along each row of a matrix, whose entries are those of f32, and in the opposite direction; infinite or NaN where nothing is known.
+    /// At least the support along each row of a matrix, whose entries are those of f32, and in the opposite direction;
+    /// infinite or NaN where nothing is known.
     #[inline(always)]
     pub fn extents<S: Simd>(&self, rows: &DMat3) -> [DVec3; 2] {
         let lanes = |axis: usize| {
@@ -145,7 +149,8 @@ mod tests {
         found[0]
     }
 
-    /// What is tabulated is never too little, also on the grid, on the edges of the cube and beside them, at any length; and no more too much than is said, for a ball.
+    /// What is tabulated is never too little, also on the grid, on the edges of the cube and beside them, at any
+    /// length; and no more too much than is said, for a ball.
     #[test]
     fn a_table_reaches_as_far_and_little_farther() {
         let mut random = Random::new(9);

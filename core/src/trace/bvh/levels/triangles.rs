@@ -28,7 +28,8 @@ pub(in crate::trace::bvh) struct TriangleTree {
     parts: Vec<PartId>,
     /// Of each part its triangles, if it is a mesh; shared with the scene.
     topology: Vec<Option<Triangles>>,
-    /// Triangles that can be hit; of a tree in which some are several times, and from which some were taken out, no more than these.
+    /// Triangles that can be hit; of a tree in which some are several times, and from which some were taken out, no
+    /// more than these.
     count: usize,
 }
 

@@ -1,7 +1,7 @@
 //! Boxes that a ball reaches, near ones first: for callers who measure distances themselves (Embree's point queries).
 //!
-//! Squared distances are computed in f32, each within 4 units in the last place, and the ball is larger by more than that. Those beyond f32 are the largest number,
-//! which a ball reaches that is as large.
+//! Squared distances are computed in f32, each within 4 units in the last place, and the ball is larger by more than
+//! that. Those beyond f32 are the largest number, which a ball reaches that is as large.
 
 use crate::math::Vec3;
 use crate::trace::bvh::Bvh;
@@ -16,9 +16,10 @@ use crate::trace::bvh::tree::Tree;
 use crate::trace::bvh::walk::{self, Enter, Visit};
 
 impl Bvh {
-    /// Names fixed triangles, by geometry and primitive, whose box is no farther from `point` than the radius that `visitor` returns last (at first `radius`), near ones
-    /// mostly first, until it has seen enough; and some that are farther by a millionth. What is placed by transforms, and what is no triangle, is not named. In
-    /// the high preset a triangle may come several times.
+    /// Names fixed triangles, by geometry and primitive, whose box is no farther from `point` than the radius that
+    /// `visitor` returns last (at first `radius`), near ones mostly first, until it has seen enough; and some that are
+    /// farther by a millionth. What is placed by transforms, and what is no triangle, is not named. In the high preset
+    /// a triangle may come several times.
     pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32, u32) -> VisitFlow) {
         if self.has_fixed() && point.is_finite() {
             let triangles = &self.fixed.triangles;
@@ -39,7 +40,8 @@ fn limit(radius: f32) -> f32 {
 }
 
 impl Ball {
-    /// Shows `leaf` the leaves of `tree` that the ball reaches; it returns the radius from there on, none where it has seen enough.
+    /// Shows `leaf` the leaves of `tree` that the ball reaches; it returns the radius from there on, none where it has
+    /// seen enough.
     #[inline(always)]
     pub fn walk<S: Simd>(&self, tree: &Tree, radius: f32, mut leaf: impl FnMut(Child) -> Option<f32>) {
         walk::single::<S, Closest>(
@@ -182,7 +184,8 @@ mod tests {
         (min - point).max(point - max).max(crate::math::DVec3::ZERO).length()
     }
 
-    /// What is within the radius is named, and hardly anything else; by all presets and instruction sets, among triangles and among boxes.
+    /// What is within the radius is named, and hardly anything else; by all presets and instruction sets, among
+    /// triangles and among boxes.
     #[test]
     fn what_a_ball_reaches_is_named() {
         let mut random = Random::new(64, 1);

@@ -1,9 +1,10 @@
 //! How far a point is at least from children of a node, and from the triangles of a block.
 //!
-//! The distance from a triangle is that of its nearest edge, or of its plane where the point may stand above it. With u = 2^-24, L the farthest corner
-//! and S the longest edge, a point of an edge that is computed to be nearest is off by less than 16 u L, for products are not divided by anything small;
-//! the height above the plane, times the normal N, by 32 u L S S, and the side of an edge that the point is on, likewise multiplied, by 32 u L L S S.
-//! What cancels in a sliver thus leaves the plane without a say, and its distance counts as 0.
+//! The distance from a triangle is that of its nearest edge, or of its plane where the point may stand above it. With
+//! u = 2^-24, L the farthest corner and S the longest edge, a point of an edge that is computed to be nearest is off by
+//! less than 16 u L, for products are not divided by anything small; the height above the plane, times the normal N, by
+//! 32 u L S S, and the side of an edge that the point is on, likewise multiplied, by 32 u L L S S. What cancels in a
+//! sliver thus leaves the plane without a say, and its distance counts as 0.
 
 use super::discs::Discs;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -11,8 +12,9 @@ use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::node::{Child, Node};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, size};
 
-/// The children of `parent`, whose node is given, that are no farther than the square root of `limit_squared`, and no more than the squared distance of each. Each component of
-/// the difference between a corner and the point may be less by `pad` than it seems.
+/// The children of `parent`, whose node is given, that are no farther than the square root of `limit_squared`, and no
+/// more than the squared distance of each. Each component of the difference between a corner and the point may be less
+/// by `pad` than it seems.
 #[inline(always)]
 pub(super) fn enter<S: Simd>(
     discs: &Discs,
@@ -109,7 +111,8 @@ fn segment<V: Vector>(a: V3<V>, edge: V3<V>) -> V {
     dot(q, q)
 }
 
-/// `error` is by how much a corner and the point may be off, both together, in each component; a corner besides by `rounding` times its distance from the point.
+/// `error` is by how much a corner and the point may be off, both together, in each component; a corner besides by
+/// `rounding` times its distance from the point.
 #[inline(always)]
 pub(super) fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32, rounding: f32) -> Lower<S::V8> {
     let (zero, splat) = (S::V8::splat(0.0), S::V8::splat);

@@ -2,8 +2,8 @@
 //!
 //! Boxes wait in one queue, those of all levels, and the nearest is opened next, until it is farther away than what was
 //! found (Hjaltason, Samet 1999, *Distance browsing in spatial databases*). So no box is opened that need not be; a
-//! stack, the simpler alternative, opens boxes that a nearer triangle elsewhere would have ruled out. Arithmetic is scalar:
-//! this answers questions about meshes, one at a time, and draws no pictures.
+//! stack, the simpler alternative, opens boxes that a nearer triangle elsewhere would have ruled out. Arithmetic is
+//! scalar: this answers questions about meshes, one at a time, and draws no pictures.
 //!
 //! Boxes of a placed object are put around where they stand in the world, and its triangles are measured there, since
 //! distances do not survive a transform that is not rigid.
@@ -53,8 +53,9 @@ impl Bvh {
     /// `max_distance` (rounded to f32; may be infinite). Distances are computed in f64; at equal ones the lowest
     /// (instance, geometry, primitive) wins. Triangles without an area count too, unlike for rays.
     ///
-    /// None where there is none as near, and for a point that is not finite or a `max_distance` that is negative or NaN.
-    /// What moves is where it stands at time 0. Shapes are left out: a placed sphere may be an ellipsoid, whose nearest point has no closed form.
+    /// None where there is none as near, and for a point that is not finite or a `max_distance` that is negative or
+    /// NaN. What moves is where it stands at time 0. Shapes are left out: a placed sphere may be an ellipsoid, whose
+    /// nearest point has no closed form.
     pub fn closest_point(&self, point: Vec3, max_distance: f32) -> Option<ClosestPoint> {
         if !(point.is_finite() && max_distance >= 0.0) {
             return None;

@@ -1,15 +1,19 @@
 //! Discs around pieces of a surface, by which a tree knows better than by its boxes how far a point is from them.
 //!
-//! The box around a piece of a surface that is tilted is as thick as the piece is wide. A point at the distance d from the surface is in reach of the
-//! boxes of all pieces within sqrt(2 d w) of where it is nearest, w being their width: a hundred blocks on a mesh of 100,000 triangles. A disc, a cylinder whose axis
-//! is the normal, is as thin as the piece is flat. Both together leave a handful.
+//! The box around a piece of a surface that is tilted is as thick as the piece is wide. A point at the distance d from
+//! the surface is in reach of the boxes of all pieces within sqrt(2 d w) of where it is nearest, w being their width: a
+//! hundred blocks on a mesh of 100,000 triangles. A disc, a cylinder whose axis is the normal, is as thin as the piece
+//! is flat. Both together leave a handful.
 //!
-//! Only points ask for discs, so they are made when the first does, from the tree, eight a node and 256 bytes, and not kept in files. Oriented boxes (Gottschalk, Lin,
-//! Manocha 1996, *OBBTree*), the alternative, take twice the memory and arithmetic.
+//! Only points ask for discs, so they are made when the first does, from the tree, eight a node and 256 bytes, and not
+//! kept in files. Oriented boxes (Gottschalk, Lin, Manocha 1996, *OBBTree*), the alternative, take twice the memory and
+//! arithmetic.
 //!
-//! Discs are made in f64 around what f32 keeps of their centres and normals, and rounded up. With u = 2^-24 and q the vector from a centre to a point, height and
-//! distance from the axis are off by less than 12 u |q|, the square of the latter by less than 40 u |q|^2. Corners that are rounded are off by u times their distance from the point in each
-//! component, besides what does not grow with that; so by 1.8 u (|q| + height + radius) at most, of which the last two are in the disc.
+//! Discs are made in f64 around what f32 keeps of their centres and normals, and rounded up. With u = 2^-24 and q the
+//! vector from a centre to a point, height and distance from the axis are off by less than 12 u |q|, the square of the
+//! latter by less than 40 u |q|^2. Corners that are rounded are off by u times their distance from the point in each
+//! component, besides what does not grow with that; so by 1.8 u (|q| + height + radius) at most, of which the last two
+//! are in the disc.
 
 use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::trace::bvh::levels::triangles::TriangleTree;
@@ -41,8 +45,8 @@ struct Disc {
     facing: DVec3,
 }
 
-/// Of so many corners a disc is made around these; of more, around the discs of its children, by which it comes to be wider than it need be. With all discs but leaves' made
-/// so, a distance takes a fifteenth longer.
+/// Of so many corners a disc is made around these; of more, around the discs of its children, by which it comes to be
+/// wider than it need be. With all discs but leaves' made so, a distance takes a fifteenth longer.
 const MAX_CORNERS: usize = 4096;
 
 impl Discs {
@@ -68,8 +72,8 @@ impl Discs {
         S::address(&self.0, if child.is_leaf() { 0 } else { child.node() })
     }
 
-    /// The squares of distances that no point of a child is nearer than, if the point and all corners together are off by at most `pad` in each component, and corners by u times their distance from the
-    /// point besides.
+    /// The squares of distances that no point of a child is nearer than, if the point and all corners together are off
+    /// by at most `pad` in each component, and corners by u times their distance from the point besides.
     #[inline(always)]
     pub(super) fn near<S: Simd>(&self, node: Child, point: Vec3, pad: f32) -> S::V8 {
         let discs = &self.0[node.node() as usize];
@@ -101,7 +105,8 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// Makes the discs of a node's children, and one around these; and whether the corners of all triangles below have been added.
+    /// Makes the discs of a node's children, and one around these; and whether the corners of all triangles below have
+    /// been added.
     fn fill(&mut self, parent: Child) -> (Disc, bool) {
         let node: &Node = self.triangles.tree().node(parent);
         let first = self.corners.len();
@@ -202,13 +207,15 @@ impl Disc {
         all.within(bounds)
     }
 
-    /// No larger than to the farthest corner of a box that holds all that counts: of a triangle that was cut, another box holds the rest.
+    /// No larger than to the farthest corner of a box that holds all that counts: of a triangle that was cut, another
+    /// box holds the rest.
     fn within(self, bounds: Aabb) -> Self {
         let farthest = (bounds.max.as_dvec3() - self.centre).max(self.centre - bounds.min.as_dvec3()).length();
         Self { height: self.height.min(farthest), radius: self.radius.min(farthest), ..self }
     }
 
-    /// Moves the centre along the normal to where there is as much on one side as on the other, of what reaches from `low` to `high`; and how much that is, roundings included.
+    /// Moves the centre along the normal to where there is as much on one side as on the other, of what reaches from
+    /// `low` to `high`; and how much that is, roundings included.
     fn shift(&mut self, low: f64, high: f64) -> f64 {
         let (unit, middle) = (self.normal.normalize(), 0.5 * (low + high));
         let wanted = self.centre + unit * middle;

@@ -1,8 +1,9 @@
 //! The point of a triangle that is nearest to a given one, in f64, of all three edges at a time.
 //!
-//! The same operations in the same order as [`closest_point`](crate::shape::closest::closest_point), so the same bits; but which end of an edge comes
-//! first, and on which part of the triangle the point is, is decided without a branch, for which is anyone's guess. Everything is scaled by a power of
-//! two, by which a triangle comes to be neither so small that products of four lengths vanish, nor so large that they overflow.
+//! The same operations in the same order as [`closest_point`](crate::shape::closest::closest_point), so the same bits;
+//! but which end of an edge comes first, and on which part of the triangle the point is, is decided without a branch,
+//! for which is anyone's guess. Everything is scaled by a power of two, by which a triangle comes to be neither so
+//! small that products of four lengths vanish, nor so large that they overflow.
 
 use std::hint::select_unpredictable;
 
@@ -150,7 +151,8 @@ mod tests {
         }
     }
 
-    /// Every number is that of the scalar one, in all regions, for corners that agree in some coordinates or in all, slivers and points on them.
+    /// Every number is that of the scalar one, in all regions, for corners that agree in some coordinates or in all,
+    /// slivers and points on them.
     #[test]
     fn numbers_are_those_of_one_edge_after_the_other() {
         let mut random = Random::new(11);

@@ -1,11 +1,13 @@
-//! The triangle that is nearest to each of many points: the others are left out in f32, those that remain are measured in f64.
+//! The triangle that is nearest to each of many points: the others are left out in f32, those that remain are measured
+//! in f64.
 //!
-//! The nearest child is gone down to first, the others wait with the distance of their boxes and discs (Roussopoulos, Kelley, Vincent 1995,
-//! *Nearest neighbor queries*), eight at a time. [`closest_point`](self::closest_point) opens boxes strictly by distance: it
-//! opens fewer, and pays for a queue. Of the eight triangles of a block those are left out whose distance, in f32 with a bound on its error, is
-//! larger than what was measured ([`bounds`]).
+//! The nearest child is gone down to first, the others wait with the distance of their boxes and discs (Roussopoulos,
+//! Kelley, Vincent 1995, *Nearest neighbor queries*), eight at a time. [`closest_point`](self::closest_point) opens
+//! boxes strictly by distance: it opens fewer, and pays for a queue. Of the eight triangles of a block those are left
+//! out whose distance, in f32 with a bound on its error, is larger than what was measured ([`bounds`]).
 //!
-//! Points are in flight together, as rays are ([`super::flight`]): alone, one waits for each node until it knows the next.
+//! Points are in flight together, as rays are ([`super::flight`]): alone, one waits for each node until it knows the
+//! next.
 
 pub(super) mod ball;
 mod bounds;
@@ -36,8 +38,8 @@ pub(in crate::trace) struct Sought {
     pub point: DVec3,
     /// In the coordinates of the tree; no component above 1e18, so that squares of distances hold in f32.
     pub local: Vec3,
-    /// The local point and the corners may be off by so much in each component, both together; and corners that are not [exact](Surveyor::is_exact) by a unit of f32 of their distance from
-    /// the point.
+    /// The local point and the corners may be off by so much in each component, both together; and corners that are not
+    /// [exact](Surveyor::is_exact) by a unit of f32 of their distance from the point.
     pub error: f32,
 }
 
@@ -54,7 +56,8 @@ pub(in crate::trace) struct NearestTriangle {
 
 /// Who asks for points, and has the corners as they were given.
 pub(in crate::trace) trait Surveyor {
-    /// Is told what is nearest to the seeker's last point, if it had one, and says its next one. After None it is not asked for that seeker again.
+    /// Is told what is nearest to the seeker's last point, if it had one, and says its next one. After None it is not
+    /// asked for that seeker again.
     fn next(&mut self, seeker: usize, last: Option<NearestTriangle>) -> Option<Sought>;
     /// The corners of a triangle as they were given, by its geometry and its primitive.
     fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3];
@@ -77,8 +80,8 @@ impl Bvh {
         Discs::new(&self.fixed.triangles)
     }
 
-    /// Finds the nearest fixed triangle of each point that is asked for, by so many count, no more than [`Self::POINTS`]; where there are no triangles nobody
-    /// is asked. `discs` are this tree's.
+    /// Finds the nearest fixed triangle of each point that is asked for, by so many count, no more than
+    /// [`Self::POINTS`]; where there are no triangles nobody is asked. `discs` are this tree's.
     pub(in crate::trace) fn nearest_triangles(&self, discs: &Discs, count: usize, surveyor: &mut impl Surveyor) {
         debug_assert!(count <= Self::POINTS, "{count} count");
         let triangles = &self.fixed.triangles;
@@ -115,7 +118,8 @@ struct Near<'a, Y> {
 }
 
 impl<Y: Surveyor> Near<'_, Y> {
-    /// Goes through the triangles of a block that may be near enough to a seeker. What it reaches next, if that is another child now.
+    /// Goes through the triangles of a block that may be near enough to a seeker. What it reaches next, if that is
+    /// another child now.
     #[inline(always)]
     fn measure<S: Simd>(&mut self, test: &LeafTest<S::V8>) -> Option<Child> {
         let LeafTest { seeker: k, leaf, lower, open } = test;
@@ -266,7 +270,8 @@ mod tests {
         [again, whole]
     }
 
-    /// Of the triangles that are as near as any the one with the lowest ids, whatever finds it; corners and edges belong to many.
+    /// Of the triangles that are as near as any the one with the lowest ids, whatever finds it; corners and edges
+    /// belong to many.
     #[test]
     fn the_nearest_triangle_has_the_lowest_ids() {
         let mut random = Random::new(21);

@@ -1,8 +1,8 @@
 //! The children that wait while a point goes on to another.
 //!
-//! As of the rays in a [flight](crate::trace::bvh::flight), whose stack is among what else they carry: with one type for both, rays took 1 to 5 % longer.
-//! Nothing here takes a branch that depends on how many are entered, for which is anyone's guess. Only when a limit shrinks is what waits gone through; so what
-//! waits is always to be visited.
+//! As of the rays in a [flight](crate::trace::bvh::flight), whose stack is among what else they carry: with one type
+//! for both, rays took 1 to 5 % longer. Nothing here takes a branch that depends on how many are entered, for which is
+//! anyone's guess. Only when a limit shrinks is what waits gone through; so what waits is always to be visited.
 
 use std::hint::select_unpredictable;
 
@@ -17,8 +17,8 @@ const MAX: usize = (MAX_DEPTH * (WIDTH - 1) + 2).next_power_of_two();
 #[derive(Clone, Copy)]
 pub(super) struct PointStack {
     len: usize,
-    /// [`Child::NONE`] at the bottom. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is stored
-    /// beside.
+    /// [`Child::NONE`] at the bottom. Of two that a node leaves waiting the nearer is on top; of more nobody says
+    /// which. Above the top is room for what is stored beside.
     children: [Child; MAX + WIDTH],
     /// The squared distance of each: the bits of an f32, of which the lowest three are not part of it.
     near: [u32; MAX + WIDTH],
@@ -34,7 +34,8 @@ impl PointStack {
         self.len = 1;
     }
 
-    /// Goes on to the nearest of the children that the mask names, or to what is on top where it names none; the others wait.
+    /// Goes on to the nearest of the children that the mask names, or to what is on top where it names none; the others
+    /// wait.
     #[inline(always)]
     pub fn enter<S: Simd>(&mut self, near: S::V8, mask: <S::V8 as Vector>::Mask, children: &[Child; WIDTH]) -> Child {
         let len = self.len % MAX;
@@ -55,7 +56,8 @@ impl PointStack {
         select_unpredictable(is_more, leaf.rest(), self.children[self.len % MAX])
     }
 
-    /// What is beyond the limit, a squared distance, waits no more. Past a block of a leaf, again: where [`Self::pass`] has led may be beyond it, too.
+    /// What is beyond the limit, a squared distance, waits no more. Past a block of a leaf, again: where [`Self::pass`]
+    /// has led may be beyond it, too.
     #[inline(always)]
     pub fn pass_within<S: Simd>(&mut self, leaf: Child, limit_squared: f32) -> Child {
         // What it came to from the stack is above the top still.
@@ -64,7 +66,8 @@ impl PointStack {
         self.pass(leaf)
     }
 
-    /// Leaves out what is beyond the limit: eight at a time, which are most often all there are, so that nobody has to guess how many.
+    /// Leaves out what is beyond the limit: eight at a time, which are most often all there are, so that nobody has to
+    /// guess how many.
     #[inline(always)]
     fn shorten<S: Simd>(&mut self, limit_squared: f32) {
         let (len, mut kept) = (self.len % MAX, 1);

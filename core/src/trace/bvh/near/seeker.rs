@@ -46,7 +46,8 @@ impl Seeker {
         waiting: PointStack::EMPTY,
     };
 
-    /// Sets out in a tree with this scale; with the triangle that was nearest to the point before, for it may be near this one too.
+    /// Sets out in a tree with this scale; with the triangle that was nearest to the point before, for it may be near
+    /// this one too.
     #[inline(always)]
     pub fn start<S: Simd>(&mut self, Sought { point, local, error }: Sought, scale: f64) {
         // What differences round relative to a box is in the box ([`crate::trace::bvh::node::widened`]).

@@ -1,16 +1,19 @@
 //! The rays of a packet as one: what bounds their origins and directions, held against eight boxes at a time.
 //!
-//! By interval arithmetic (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*): with x the
-//! least that a slab's distance from an origin may be, no ray enters it before x times the least magnitude of 1 / d, if it is ahead of the
-//! origins; with x the largest, none leaves it after x times the largest. What is behind gives something below 0 either way, which as an entry means
-//! the same as 0, and as an exit that nothing is met.
-//! The one origin and the one reciprocal of a side belong together, so the product may be computed as that of a single ray is ([`crate::trace::bvh::reject::slab`]), bound
-//! times reciprocal and an offset. Intervals of origin / d and of 1 / d would vary apart from each other, which rays that start in one point do not.
+//! By interval arithmetic (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume
+//! hierarchies*): with x the least that a slab's distance from an origin may be, no ray enters it before x times the
+//! least magnitude of 1 / d, if it is ahead of the origins; with x the largest, none leaves it after x times the
+//! largest. What is behind gives something below 0 either way, which as an entry means the same as 0, and as an exit
+//! that nothing is met. The one origin and the one reciprocal of a side belong together, so the product may be computed
+//! as that of a single ray is ([`crate::trace::bvh::reject::slab`]), bound times reciprocal and an offset. Intervals of
+//! origin / d and of 1 / d would vary apart from each other, which rays that start in one point do not.
 //!
-//! With u = 2^-24, the moved origin, the reciprocal, both products and the sum round by less than 5 u |1/d| (|bound| + |origin|) together, fused or
-//! not; the origin is moved by 10 u of itself, and boxes, in the tree ([`crate::trace::bvh::node::widened`]) and around triangles, are wide by as much of their bounds, which leaves room for
-//! the rounding of the hit's own t. The origin is moved by another 2^-126, and each offset by 2^-124,
-//! for lengths and t that are no normal numbers, be they flushed to zero. Small components of directions are replaced as for single rays.
+//! With u = 2^-24, the moved origin, the reciprocal, both products and the sum round by less than 5 u |1/d| (|bound| +
+//! |origin|) together, fused or not; the origin is moved by 10 u of itself, and boxes, in the tree
+//! ([`crate::trace::bvh::node::widened`]) and around triangles, are wide by as much of their bounds, which leaves room
+//! for the rounding of the hit's own t. The origin is moved by another 2^-126, and each offset by 2^-124, for lengths
+//! and t that are no normal numbers, be they flushed to zero. Small components of directions are replaced as for single
+//! rays.
 
 use super::Packet;
 use crate::math::{Aabb, UNIT_ROUNDOFF};
@@ -30,8 +33,8 @@ pub(super) struct Beam {
     pub is_wide: bool,
     /// On each axis whether a box's upper side is met first.
     pub is_backward: [bool; 3],
-    /// Of the sides that are met first: on each axis less the origin farthest on, and the pad, times the reciprocal. One number more, here and
-    /// below, as a vector is stored.
+    /// Of the sides that are met first: on each axis less the origin farthest on, and the pad, times the reciprocal.
+    /// One number more, here and below, as a vector is stored.
     near_offset: [f32; 4],
     /// Of the sides that are met last: less the origin farthest back, moved back by the pad, times the reciprocal.
     far_offset: [f32; 4],
@@ -55,7 +58,8 @@ const LONGEST: f32 = 1e30;
 pub(super) const WIDE: f32 = 1.0 / 16.0;
 
 impl Beam {
-    /// Of rays of which each is valid; none where they go different ways. It is wide where they are more than the share `wide` of `bounds` apart.
+    /// Of rays of which each is valid; none where they go different ways. It is wide where they are more than the share
+    /// `wide` of `bounds` apart.
     #[inline(always)]
     pub fn new<S: Simd, const N: usize>(packets: &[&Packet; N], bounds: Aabb, wide: f32) -> Option<Self> {
         let (mut least, mut most) = (S::V8::splat(f32::INFINITY), S::V8::splat(f32::NEG_INFINITY));
@@ -153,8 +157,8 @@ impl Beam {
     }
 }
 
-/// Least and largest components of directions without small ones, which count as running the way of the others; none where these run both
-/// ways.
+/// Least and largest components of directions without small ones, which count as running the way of the others; none
+/// where these run both ways.
 #[cold]
 #[inline(never)]
 fn clamp(mut low: [f32; 3], mut high: [f32; 3], smallest: f32) -> Option<([f32; 3], [f32; 3])> {
@@ -193,7 +197,8 @@ mod tests {
     use crate::trace::bvh::simd::Portable;
     use crate::trace::bvh::tree::Tree;
 
-    /// As of single rays: the box around a point of a ray that makes up a beam is entered, in the tree and as that around a triangle, whatever lies far away.
+    /// As of single rays: the box around a point of a ray that makes up a beam is entered, in the tree and as that
+    /// around a triangle, whatever lies far away.
     #[test]
     fn no_point_of_a_beam_is_lost() {
         let (mut random, mut beams) = (Random::new(32), 0);

@@ -20,9 +20,10 @@ use crate::trace::bvh::walk::{Enter, Near, lowest};
 pub type Visitor<'a> = dyn FnMut(u32, u32, &mut [f32; RAYS]) + 'a;
 
 impl BoxTree {
-    /// [`BoxTree::visit`] of those rays of a packet that `lanes` has a bit for, as one: names boxes that they enter, with a bit for each that does, as long as `visitor` has any
-    /// look farther than below 0; one that is alone at once, by whoever is valid. Not where they go different ways, or boxes move: then none is named, and the answer is
-    /// no.
+    /// [`BoxTree::visit`] of those rays of a packet that `lanes` has a bit for, as one: names boxes that they enter,
+    /// with a bit for each that does, as long as `visitor` has any look farther than below 0; one that is alone at
+    /// once, by whoever is valid. Not where they go different ways, or boxes move: then none is named, and the answer
+    /// is no.
     pub fn visit_packet(&self, packet: &Packet, lanes: u32, visitor: &mut Visitor<'_>) -> bool {
         self.visit_packet_as::<Closest>(packet, lanes, visitor)
     }
@@ -88,7 +89,8 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
         let tree = boxes.tree();
         let mut own = None;
         let asked = Asked { packets: [packet], lanes: [lanes] };
-        // Rays that are nearly half as far apart as boxes in a row are enter different ones; and the fewer they are, the less they save each other.
+        // Rays that are nearly half as far apart as boxes in a row are enter different ones; and the fewer they are,
+        // the less they save each other.
         let share = lanes.count_ones() as f32 / RAYS as f32;
         let wide = WIDE.min(0.4 * share * share / (boxes.count() as f32).cbrt());
         let Some((asked, beam)) = together::<S, 1>(tree.bounds(), wide, &asked, &mut own) else { return false };
@@ -131,7 +133,8 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
     }
 }
 
-/// Has rays look as far as these limits, and says how far that is at most, both rounded up; below 0 where none looks any farther.
+/// Has rays look as far as these limits, and says how far that is at most, both rounded up; below 0 where none looks
+/// any farther.
 #[inline(always)]
 fn look<S: Simd, Q: Query>(party: &Party<'_, Q, S::V8, 1>, limits: &[f32; RAYS], valid: u32) -> f32 {
     let wide = S::V8::load(limits).mul_add(S::V8::splat(1.0 + SLACK), S::V8::splat(f32::MIN_POSITIVE));
@@ -174,7 +177,8 @@ mod tests {
     use crate::trace::bvh::alone::VisitFlow;
     use crate::trace::bvh::build::preset::Options;
 
-    /// Every box that a ray enters by itself is named, with a bit for each ray that is asked for, and rays are placed as points and vectors are.
+    /// Every box that a ray enters by itself is named, with a bit for each ray that is asked for, and rays are placed
+    /// as points and vectors are.
     #[test]
     fn what_single_rays_enter_packets_enter() {
         let mut random = Random::new(66, 0);

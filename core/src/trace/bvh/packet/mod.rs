@@ -1,19 +1,23 @@
 //! Eight or sixteen rays of a caller's that go the same way: they walk as one, and meet triangles eight at a time.
 //!
-//! Interfaces that hand over packets (Embree's C functions) do so for speed, and have not enough rays at once for a bundle of 64
-//! ([`super::bundle`]), whose making takes longer than eight rays do. So as little as possible is made ready:
+//! Interfaces that hand over packets (Embree's C functions) do so for speed, and have not enough rays at once for a
+//! bundle of 64 ([`super::bundle`]), whose making takes longer than eight rays do. So as little as possible is made
+//! ready:
 //!
-//! - **Nodes** are tested against the [`Beam`] of all rays, an interval for each component of origins and reciprocal directions, at
-//!   little more than what a single ray costs. Rays are asked only if any hit will do, and at leaves ([`Party`](party::Party)).
-//! - **Triangles**: the beam rejects most of a block by their boxes. Of the others each is tested against eight rays, a lane a ray
-//!   ([`Octet`]), by the test and with the bounds of single rays ([`super::reject::woop`]).
-//! - **Decisions**: what bounds leave no doubt about is noted, and computed at the end, four rays at a time; what they do is decided at once
-//!   ([`Doubts`]). So the bits are those of single rays.
+//! - **Nodes** are tested against the [`Beam`] of all rays, an interval for each component of origins and reciprocal
+//!   directions, at little more than what a single ray costs. Rays are asked only if any hit will do, and at leaves
+//!   ([`Party`](party::Party)).
+//! - **Triangles**: the beam rejects most of a block by their boxes. Of the others each is tested against eight rays, a
+//!   lane a ray ([`Octet`]), by the test and with the bounds of single rays ([`super::reject::woop`]).
+//! - **Decisions**: what bounds leave no doubt about is noted, and computed at the end, four rays at a time; what they
+//!   do is decided at once ([`Doubts`]). So the bits are those of single rays.
 //!
-//! Boxes of which callers know what is in them are walked by the beam as well, and each ray is asked at them ([`BoxTree::visit_packet`](super::boxes::BoxTree::visit_packet)).
+//! Boxes of which callers know what is in them are walked by the beam as well, and each ray is asked at them
+//! ([`BoxTree::visit_packet`](super::boxes::BoxTree::visit_packet)).
 //!
-//! Rays that run both ways along an axis make no beam, and those that are far apart make a wide one, which would enter most of the tree: they walk
-//! alone. Asking each ray at each node, as a packet traversal does, would keep them together, but costs the others more.
+//! Rays that run both ways along an axis make no beam, and those that are far apart make a wide one, which would enter
+//! most of the tree: they walk alone. Asking each ray at each node, as a packet traversal does, would keep them
+//! together, but costs the others more.
 
 mod alone;
 mod beam;
@@ -44,7 +48,8 @@ const RAYS: usize = Packet::RAYS;
 /// Packets that travel together at most.
 const MAX: usize = 2;
 
-/// Eight rays, component by component, in the order in which Embree's `RTCRay8` begins: a caller's can be read where it is.
+/// Eight rays, component by component, in the order in which Embree's `RTCRay8` begins: a caller's can be read where it
+/// is.
 #[repr(C, align(32))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packet {
@@ -187,13 +192,14 @@ impl PacketHits {
 }
 
 impl Bvh {
-    /// [`Bvh::closest_triangle`] of each ray of a packet, or of two that go together, with the same bits: `tell` reads them where they lie, in the
-    /// thread's own memory, and calls none of these functions meanwhile.
+    /// [`Bvh::closest_triangle`] of each ray of a packet, or of two that go together, with the same bits: `tell` reads
+    /// them where they lie, in the thread's own memory, and calls none of these functions meanwhile.
     #[inline]
     pub fn closest_packets<const N: usize>(&self, asked: &Asked<'_, N>, tell: impl FnOnce(&[PacketHits; N])) {
         const { assert!(N >= 1 && N <= MAX, "one packet, or two") };
         with_scratch(|scratch| {
-            // Not asked before: what was given here is then read piece by piece, as it was written, and not in one go, which would have to wait for the pieces.
+            // Not asked before: what was given here is then read piece by piece, as it was written, and not in one go,
+            // which would have to wait for the pieces.
             if self.has_fixed() {
                 isa::dispatch(self.isa, ClosestPackets { bvh: self, asked, scratch });
             } else {
@@ -286,7 +292,8 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
     }
 }
 
-/// The packets, `own` ones if rays had to be left out, and their beam; none where rays make no beam, or are more than the share `wide` of `bounds` apart.
+/// The packets, `own` ones if rays had to be left out, and their beam; none where rays make no beam, or are more than
+/// the share `wide` of `bounds` apart.
 #[inline(always)]
 fn together<'a, S: Simd, const N: usize>(
     bounds: Aabb,

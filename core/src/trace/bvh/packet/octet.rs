@@ -1,7 +1,7 @@
 //! Eight rays of a packet against one triangle after the other, and what they have hit.
 //!
-//! A lane a ray, so that a triangle is looked at once for all of them. What is in doubt is told, a bit a ray; the caller decides it as
-//! for a single ray ([`Found`](crate::trace::bvh::hits::found::Found)).
+//! A lane a ray, so that a triangle is looked at once for all of them. What is in doubt is told, a bit a ray; the
+//! caller decides it as for a single ray ([`Found`](crate::trace::bvh::hits::found::Found)).
 
 use super::{Packet, RAYS};
 use crate::trace::bvh::block::Block;

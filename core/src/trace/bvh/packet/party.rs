@@ -1,7 +1,7 @@
 //! The beam of a packet, and its rays one by one: of shadow rays each is asked at the boxes of leaves.
 //!
-//! A beam is wide for triangles of the size of pixels: it enters leaves that none of its rays enters, and each triangle in them costs as much as
-//! three boxes. Closest hits gain less by that than it costs them.
+//! A beam is wide for triangles of the size of pixels: it enters leaves that none of its rays enters, and each triangle
+//! in them costs as much as three boxes. Closest hits gain less by that than it costs them.
 
 use std::cell::Cell;
 use std::marker::PhantomData;

@@ -1,6 +1,7 @@
 //! What a thread needs while it traces packets.
 //!
-//! It lies in the thread's own memory, always ready: to lend a box and take it back would be some thirty instructions more, to clear as much some hundred.
+//! It lies in the thread's own memory, always ready: to lend a box and take it back would be some thirty instructions
+//! more, to clear as much some hundred.
 
 use std::cell::RefCell;
 

@@ -11,7 +11,8 @@ use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes};
 /// A ray made ready for the f32 reject test.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace::bvh) struct Filter {
-    /// The axis along which the direction is largest, before it the two that follow it: of each, how many bytes after the first axis its corners are in a block.
+    /// The axis along which the direction is largest, before it the two that follow it: of each, how many bytes after
+    /// the first axis its corners are in a block.
     pub axes: [u32; 3],
     /// Origin, in the order of `axes`.
     pub origin: [f32; 3],
@@ -32,8 +33,8 @@ pub(in crate::trace::bvh) struct Filter {
 pub(in crate::trace::bvh) struct Candidates {
     /// A bit for each of them.
     pub lanes: u32,
-    /// A bit for those that it hits without doubt, at a t between `low` and `high`, and so that t, u and v can be computed
-    /// in f64.
+    /// A bit for those that it hits without doubt, at a t between `low` and `high`, and so that t, u and v can be
+    /// computed in f64.
     pub sure: u32,
     pub low: [f32; LANES],
     pub high: [f32; LANES],
@@ -107,8 +108,8 @@ impl Filter {
         (sides, passed)
     }
 
-    /// The triangles that it may hit, of those that it may pass within, after [`Self::look`]. If they are not `ROUNDED`, corners are those that are meant;
-    /// else the blur's origin has room for what they are off by.
+    /// The triangles that it may hit, of those that it may pass within, after [`Self::look`]. If they are not
+    /// `ROUNDED`, corners are those that are meant; else the blur's origin has room for what they are off by.
     #[inline(always)]
     pub fn meet<S: Simd, const BLURRED: bool, const ROUNDED: bool>(
         &self,
@@ -129,7 +130,8 @@ impl Filter {
             blur,
             #[inline(always)]
             || {
-                // Asked that rarely, corners are better loaded again than kept: the black box keeps them from being kept.
+                // Asked that rarely, corners are better loaded again than kept: the black box keeps them from being
+                // kept.
                 let block = std::hint::black_box(block);
                 let [kx, ky, kz] = self.axes;
                 let corners = [S::corners(block, kx), S::corners(block, ky), S::corners(block, kz)];
@@ -260,8 +262,9 @@ mod tests {
         [hits.t32[0], hits.u[0], hits.v[0]]
     }
 
-    /// Held against the exact test, for triangles from larger than their distance to a millionth of it, at any scale, thin ones among them, by rays that
-    /// pass through them, along their edges and beside them: none that is hit is left out; what is sure is hit, between the bounds, and computed in f64 as there.
+    /// Held against the exact test, for triangles from larger than their distance to a millionth of it, at any scale,
+    /// thin ones among them, by rays that pass through them, along their edges and beside them: none that is hit is
+    /// left out; what is sure is hit, between the bounds, and computed in f64 as there.
     #[test]
     fn bounds_hold() {
         let mut random = Random::new(1);
@@ -324,7 +327,8 @@ mod tests {
         }
     }
 
-    /// Triangles that are seen edge-on, from far beside them: edge functions are then but the rounding of their products, and may agree.
+    /// Triangles that are seen edge-on, from far beside them: edge functions are then but the rounding of their
+    /// products, and may agree.
     #[test]
     fn rounding_alone_is_no_hit() {
         let known = [

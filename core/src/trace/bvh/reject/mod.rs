@@ -1,5 +1,6 @@
-//! What a ray cannot hit: boxes ([`slab`]) and triangles ([`woop`], [`planes`], [`filter`]) are left out in f32, by bounds on all that
-//! rounding may do. Rays are made ready for it one at a time, or eight ([`ready`]), and may be a little off the ones that are meant: [`Blur`].
+//! What a ray cannot hit: boxes ([`slab`]) and triangles ([`woop`], [`planes`], [`filter`]) are left out in f32, by
+//! bounds on all that rounding may do. Rays are made ready for it one at a time, or eight ([`ready`]), and may be a
+//! little off the ones that are meant: [`Blur`].
 
 pub(super) mod filter;
 pub(super) mod planes;

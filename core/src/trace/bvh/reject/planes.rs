@@ -1,7 +1,8 @@
 //! The planes of triangles, a lane each, and how high an origin lies over them.
 //!
-//! Let u = 2^-24 and N be the normal with all signs positive. Edges err by u, the normal by 4 u N, the way p from the first corner to the
-//! origin by u (and `blur`), and the scalar product of both by another 3 u N p. Corners are taken to be exact.
+//! Let u = 2^-24 and N be the normal with all signs positive. Edges err by u, the normal by 4 u N, the way p from the
+//! first corner to the origin by u (and `blur`), and the scalar product of both by another 3 u N p. Corners are taken
+//! to be exact.
 
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::simd::Vector;

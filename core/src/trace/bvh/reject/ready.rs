@@ -1,6 +1,7 @@
 //! Rays made ready for nodes and triangles eight at a time: as columns, which are turned into a row or four for each.
 //!
-//! The numbers are those of [`SlabRay`] and [`Filter`]. A ray that comes by itself is made ready in fewer steps ([`crate::trace::bvh::alone`]), but not in an eighth.
+//! The numbers are those of [`SlabRay`] and [`Filter`]. A ray that comes by itself is made ready in fewer steps
+//! ([`crate::trace::bvh::alone`]), but not in an eighth.
 
 use super::Blur;
 use super::filter::{Filter, Filters};
@@ -129,9 +130,9 @@ impl<'a> ReadyRays<'a> {
     }
 }
 
-/// As [`SlabRay::new`] and [`Filter::new`] for eight rays, field by field as [`columns`] has them; and a bit for each that [is valid](Ray::is_valid). Origins are off by what
-/// the blur says, and besides, as directions are, by its second part of their largest component: that is [`Blur::NONE`],
-/// or rays were rounded.
+/// As [`SlabRay::new`] and [`Filter::new`] for eight rays, field by field as [`columns`] has them; and a bit for each
+/// that [is valid](Ray::is_valid). Origins are off by what the blur says, and besides, as directions are, by its second
+/// part of their largest component: that is [`Blur::NONE`], or rays were rounded.
 #[inline(always)]
 pub(in crate::trace::bvh) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([ReadyRay; 8], u32) {
     let splat = S::V8::splat;

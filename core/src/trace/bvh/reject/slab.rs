@@ -1,21 +1,24 @@
 //! A ray against eight boxes at once, conservatively.
 //!
 //! A slab's t is bound * (1 / direction) - origin * (1 / direction): with u = 2^-24, the reciprocal, both products, the
-//! sum and the offset below round by less than 5 u |1/d| (|bound| + |origin|) together, fused or not. Boxes in the tree are wider by
-//! 7 u |bound| than what is in them ([`crate::trace::bvh::node::widened`]), and the near and far t are moved apart by 6 u |1/d| |origin|: an exact hit
-//! is never lost, and there is slack for the rounding of the hit's own t. (Ize 2013, *Robust BVH ray traversal*, moves the
-//! far t by a relative 2 ulp instead, which needs bound - origin to be formed first: twice the operations. To move both t by the largest coordinate
-//! in the tree makes rays in the middle of a large ground enter all that is near them.) What is no normal number
-//! rounds by more than that: hence another 2^-126, of t and of lengths.
+//! sum and the offset below round by less than 5 u |1/d| (|bound| + |origin|) together, fused or not. Boxes in the tree
+//! are wider by 7 u |bound| than what is in them ([`crate::trace::bvh::node::widened`]), and the near and far t are
+//! moved apart by 6 u |1/d| |origin|: an exact hit is never lost, and there is slack for the rounding of the hit's own
+//! t. (Ize 2013, *Robust BVH ray traversal*, moves the far t by a relative 2 ulp instead, which needs bound - origin to
+//! be formed first: twice the operations. To move both t by the largest coordinate in the tree makes rays in the middle
+//! of a large ground enter all that is near them.) What is no normal number rounds by more than that: hence another
+//! 2^-126, of t and of lengths.
 //!
-//! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how
-//! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. An axis on which something still overflows, or 1/d is no normal number, which may be
-//! flushed to zero, is left open: [`OPEN`]. An infinite pad would do for boxes, but empty slots, whose bounds are infinite, would pass as well.
+//! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how far
+//! the ray strays then: 1/d stays finite, and no 0 * infinity arises. An axis on which something still overflows, or
+//! 1/d is no normal number, which may be flushed to zero, is left open: [`OPEN`]. An infinite pad would do for boxes,
+//! but empty slots, whose bounds are infinite, would pass as well.
 //!
-//! A ray in an object's coordinates may be off by more ([`Blur`]), its origin by b and its direction by r times the largest
-//! component: at the t of a hit, at most the largest span over that component, the span being what is between the origin and the box, it is off by b + r span, and the pad is wider
-//! by this over the component. Boxes are wider by 5 u of their largest coordinate, so that the span is the origin's largest coordinate unless r is more than [`SLIGHT`], and else that
-//! and the reach, the largest coordinate in the tree.
+//! A ray in an object's coordinates may be off by more ([`Blur`]), its origin by b and its direction by r times the
+//! largest component: at the t of a hit, at most the largest span over that component, the span being what is between
+//! the origin and the box, it is off by b + r span, and the pad is wider by this over the component. Boxes are wider by
+//! 5 u of their largest coordinate, so that the span is the origin's largest coordinate unless r is more than
+//! [`SLIGHT`], and else that and the reach, the largest coordinate in the tree.
 
 use super::Blur;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -49,8 +52,8 @@ const _: () = assert!(1.1 * SLIGHT < WIDENED_ALL && 6.0 * UNIT_ROUNDOFF < WIDENE
 /// Products of this size are not trusted to be finite after a sum.
 pub(in crate::trace::bvh) const HUGE: f32 = 1e37;
 
-/// The magnitude of 1/d on an axis that is open: products with coordinates are finite, those with the bounds of an empty slot are
-/// not. Offsets are the largest numbers then, so that every box is entered at once, and not left.
+/// The magnitude of 1/d on an axis that is open: products with coordinates are finite, those with the bounds of an
+/// empty slot are not. Offsets are the largest numbers then, so that every box is entered at once, and not left.
 const OPEN: f32 = f32::MIN_POSITIVE;
 
 impl SlabRay {
@@ -68,8 +71,8 @@ impl SlabRay {
         }
     }
 
-    /// The rows of bounds that a ray meets first, one of two for each axis: how many bytes after the first row they start. A bit is set for each axis
-    /// along which it goes down.
+    /// The rows of bounds that a ray meets first, one of two for each axis: how many bytes after the first row they
+    /// start. A bit is set for each axis along which it goes down.
     #[inline(always)]
     pub fn first_rows(negative: u32) -> [u32; 3] {
         [
@@ -132,7 +135,8 @@ impl<V: Vector> Slabs<V> {
         Self::new(o, d, away, span, splat(smallest), splat(stray))
     }
 
-    /// Of as many rays as there are lanes, axis by axis. Origins are off by `off`, directions by `turn` of their largest component.
+    /// Of as many rays as there are lanes, axis by axis. Origins are off by `off`, directions by `turn` of their
+    /// largest component.
     #[inline(always)]
     pub fn of_rays(origin: [V; 3], direction: [V; 3], reach: [V; 3], off: V, turn: V) -> [Self; 3] {
         let splat = V::splat;
@@ -152,8 +156,9 @@ impl<V: Vector> Slabs<V> {
         ]
     }
 
-    /// `away` is the origin's magnitude, `span` that and the reach, `smallest` what a direction's component is at least taken to be, and `stray` how far the ray may be off besides
-    /// rounding, with room for lengths that are no normal numbers.
+    /// `away` is the origin's magnitude, `span` that and the reach, `smallest` what a direction's component is at least
+    /// taken to be, and `stray` how far the ray may be off besides rounding, with room for lengths that are no normal
+    /// numbers.
     #[inline(always)]
     fn new(origin: V, direction: V, away: V, span: V, smallest: V, stray: V) -> Self {
         let (splat, zero) = (V::splat, V::splat(0.0));
@@ -204,7 +209,8 @@ mod tests {
     use crate::trace::bvh::simd::Portable;
     use crate::trace::bvh::tree::Tree;
 
-    /// The box around a point of a ray is entered at its t, whoever makes the ray ready, and whatever lies beside it far away; also where the ray is off.
+    /// The box around a point of a ray is entered at its t, whoever makes the ray ready, and whatever lies beside it
+    /// far away; also where the ray is off.
     #[test]
     fn no_point_of_a_ray_is_lost() {
         let (mut random, mut valid) = (Random::new(31), 0);

@@ -1,5 +1,5 @@
-//! Vectors as plain arrays, for processors of which nothing else is known here. Whatever is done to them, their lanes are numbers one by one: they are what other
-//! vectors are compared with.
+//! Vectors as plain arrays, for processors of which nothing else is known here. Whatever is done to them, their lanes
+//! are numbers one by one: they are what other vectors are compared with.
 
 use super::{Array, Doubles, Group, Mask, PerRay, RAYS, TURNED, Three, Turned, Vector};
 

@@ -1,6 +1,7 @@
 //! AVX2 and FMA.
 //!
-//! SAFETY of every block below: as in `x86`; or loads and stores stay within what a reference leads to, as is said where they do.
+//! SAFETY of every block below: as in `x86`; or loads and stores stay within what a reference leads to, as is said
+//! where they do.
 #![allow(unsafe_code)] // Intrinsics.
 
 use std::arch::x86_64::*;
@@ -167,8 +168,8 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn row(node: &Node, offset: u32) -> V8 {
-        // The mask keeps it within the node, which is eight rows long: a compare and a branch would be two instructions, and end what the
-        // compiler sees at once.
+        // The mask keeps it within the node, which is eight rows long: a compare and a branch would be two
+        // instructions, and end what the compiler sees at once.
         const WITHIN: u32 = 7 * Node::ROW;
         const { assert!(size_of::<Node>() as u32 == WITHIN + Node::ROW) };
         unsafe { V8(_mm256_loadu_ps(std::ptr::from_ref(node).byte_add((offset & WITHIN) as usize).cast())) }

@@ -1,5 +1,5 @@
-//! Boxes in vectors, as the builder has them: what it asks of a vector beyond arithmetic. All implementations give the same bits, so the tree is
-//! the same for every instruction set: nothing is fused.
+//! Boxes in vectors, as the builder has them: what it asks of a vector beyond arithmetic. All implementations give the
+//! same bits, so the tree is the same for every instruction set: nothing is fused.
 #![allow(unsafe_code)] // Intrinsics; see `x86`.
 
 use super::Vector;
@@ -13,7 +13,8 @@ pub(in crate::trace::bvh) trait Boxes: Copy {
     fn swap_halves(self) -> Self;
     /// Each lane towards zero; anything for what does not fit.
     fn truncate(self) -> [i32; 8];
-    /// `left` and `right`, this box joined to the first where its doubled centre on `axis` (0, 1, 2) lies before `at`, else to the second; and whether it does.
+    /// `left` and `right`, this box joined to the first where its doubled centre on `axis` (0, 1, 2) lies before `at`,
+    /// else to the second; and whether it does.
     fn join_side(self, axis: usize, at: f32, left: Self, right: Self) -> (Self, Self, bool);
     /// Half the surface of three boxes; the last lane is anything.
     fn half_areas(boxes: [Self; 3]) -> [f32; 4];

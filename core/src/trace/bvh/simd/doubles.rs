@@ -1,6 +1,7 @@
 //! Four f64 at a time, and vectors of them, component by component.
 //!
-//! Nothing is fused, and sums are added up from the left, as glam does: so the bits are those of the same operations on a [`DVec3`](crate::math::DVec3).
+//! Nothing is fused, and sums are added up from the left, as glam does: so the bits are those of the same operations on
+//! a [`DVec3`](crate::math::DVec3).
 
 use super::{Array, Three};
 

@@ -1,4 +1,5 @@
-//! One kernel, compiled once for each instruction set, which is chosen once for as much work as possible: a batch, a subtree, a caller's ray.
+//! One kernel, compiled once for each instruction set, which is chosen once for as much work as possible: a batch, a
+//! subtree, a caller's ray.
 #![allow(unsafe_code)] // Calling a function that needs AVX2 after having asked the processor.
 
 use crate::trace::bvh::simd::{Portable, Simd};
@@ -87,8 +88,9 @@ impl Present {
     }
 }
 
-/// Work that is compiled for each instruction set: everything below `run` is `inline(always)`, so that it ends up in one
-/// function per instruction set, but for what runs [apart](Simd::apart). What is [narrow](dispatch_narrow) has one for AVX2 and AVX-512.
+/// Work that is compiled for each instruction set: everything below `run` is `inline(always)`, so that it ends up in
+/// one function per instruction set, but for what runs [apart](Simd::apart). What is [narrow](dispatch_narrow) has one
+/// for AVX2 and AVX-512.
 pub(in crate::trace::bvh) trait Kernel {
     type Output;
     fn run<S: Simd>(self) -> Self::Output;
@@ -108,9 +110,10 @@ pub(in crate::trace::bvh) fn dispatch<K: Kernel>(Present(isa): Present, kernel: 
     }
 }
 
-/// Runs `kernel`, in which nothing is wider than eight lanes, compiled for AVX2 where `isa` is AVX-512: AVX-512's masks have a latency that AVX2's vectors do
-/// not. On a Zen 4, rays in flight and distances compiled for AVX-512 reach 0.93 to 0.95 of their rate with AVX2. Not for single rays, which use AVX-512's 32 registers:
-/// with AVX2 they reach 0.95 to 0.98 of their rate with AVX-512.
+/// Runs `kernel`, in which nothing is wider than eight lanes, compiled for AVX2 where `isa` is AVX-512: AVX-512's masks
+/// have a latency that AVX2's vectors do not. On a Zen 4, rays in flight and distances compiled for AVX-512 reach 0.93
+/// to 0.95 of their rate with AVX2. Not for single rays, which use AVX-512's 32 registers: with AVX2 they reach 0.95 to
+/// 0.98 of their rate with AVX-512.
 #[inline(always)]
 pub(in crate::trace::bvh) fn dispatch_narrow<K: Kernel>(Present(isa): Present, kernel: K) -> K::Output {
     match isa {

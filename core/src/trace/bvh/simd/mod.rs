@@ -1,11 +1,13 @@
 //! Several numbers at a time, by whatever the processor has.
 //!
-//! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`] (SSE2 on x86-64, plain arrays elsewhere), [`Avx2`]
-//! and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are fused, so what is fused serves only tests
-//! that reject conservatively; where bits of f32 are kept, as by [`super::levels::farthest`], products and sums are rounded one by one. f64 is never fused: its operations round as the scalar ones of
-//! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
+//! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`] (SSE2 on x86-64, plain
+//! arrays elsewhere), [`Avx2`] and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are
+//! fused, so what is fused serves only tests that reject conservatively; where bits of f32 are kept, as by
+//! [`super::levels::farthest`], products and sums are rounded one by one. f64 is never fused: its operations round as
+//! the scalar ones of [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
 //!
-//! Beside these, what vectors are made of: a number for each ray of a bundle ([`PerRay`]), and a box as the builder has it ([`boxes`]).
+//! Beside these, what vectors are made of: a number for each ray of a bundle ([`PerRay`]), and a box as the builder has
+//! it ([`boxes`]).
 
 mod arrays;
 #[cfg(target_arch = "x86_64")]
@@ -66,19 +68,20 @@ pub(super) trait Simd {
     type Wide: Group;
     /// Four f64.
     type D4: Doubles<F = Self::V4>;
-    /// Runs a part of a kernel in a function of its own. All else ends up in one, in which nothing that lives long stays in a register: what
-    /// is done once for many rays, and has a loop in it, is better apart.
+    /// Runs a part of a kernel in a function of its own. All else ends up in one, in which nothing that lives long
+    /// stays in a register: what is done once for many rays, and has a loop in it, is better apart.
     fn apart<K: Kernel>(kernel: K) -> K::Output;
-    /// The same of a part in which nothing is wider than eight lanes, as [`dispatch_narrow`](self::isa::dispatch_narrow) runs it: with another instruction set than
-    /// this, perhaps, so nothing that the part is given may be of this one.
+    /// The same of a part in which nothing is wider than eight lanes, as
+    /// [`dispatch_narrow`](self::isa::dispatch_narrow) runs it: with another instruction set than this, perhaps, so
+    /// nothing that the part is given may be of this one.
     #[inline(always)]
     fn apart_narrow<K: Kernel>(kernel: K) -> K::Output {
         Self::apart(kernel)
     }
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
-    /// Children that the mask names, the farthest first, by where they are entered (not below 0, nor -0); then others. How many it names.
-    /// Of `near` the lowest three bits are lost: in `sorted_near` they are the child's slot.
+    /// Children that the mask names, the farthest first, by where they are entered (not below 0, nor -0); then others.
+    /// How many it names. Of `near` the lowest three bits are lost: in `sorted_near` they are the child's slot.
     fn far_to_near(
         near: Self::V8,
         mask: <Self::V8 as Vector>::Mask,
@@ -86,8 +89,10 @@ pub(super) trait Simd {
         sorted_near: &mut [u32; 8],
         sorted_child: &mut [Child; 8],
     ) -> usize;
-    /// Of the children that the mask names the nearest, told as [`Self::far_to_near`] does; and how many others there are. These are stored likewise, but in
-    /// order only where they are two, and else in one that is the same on every instruction set. Vectors take no branch that depends on what the mask names. If it names none, the child is anyone's.
+    /// Of the children that the mask names the nearest, told as [`Self::far_to_near`] does; and how many others there
+    /// are. These are stored likewise, but in order only where they are two, and else in one that is the same on every
+    /// instruction set. Vectors take no branch that depends on what the mask names. If it names none, the child is
+    /// anyone's.
     fn nearest_apart(
         near: Self::V8,
         mask: <Self::V8 as Vector>::Mask,
@@ -95,8 +100,8 @@ pub(super) trait Simd {
         other_near: &mut [u32; 8],
         other_child: &mut [Child; 8],
     ) -> (Child, usize);
-    /// Of the first `count` of eight entries, as [`Self::far_to_near`] stores them, those that are not farther than the limit, in their order; then others. How
-    /// many these are.
+    /// Of the first `count` of eight entries, as [`Self::far_to_near`] stores them, those that are not farther than the
+    /// limit, in their order; then others. How many these are.
     fn within(
         limit: f32,
         entries: (&[u32; 8], &[Child; 8]),
@@ -110,9 +115,11 @@ pub(super) trait Simd {
     fn highest_bits(numbers: &[u32; 32]) -> u32;
     /// A bit for each number that is `number`.
     fn equal(numbers: &[u32; 32], number: u32) -> u32;
-    /// The row of a node's bounds that starts `offset` bytes after the first. What is no row's start means some of its bytes.
+    /// The row of a node's bounds that starts `offset` bytes after the first. What is no row's start means some of its
+    /// bytes.
     fn row(node: &Node, offset: u32) -> Self::V8;
-    /// A component of a block's corners, `offset` bytes after that of the first axis. What is no such start means some of its numbers.
+    /// A component of a block's corners, `offset` bytes after that of the first axis. What is no such start means some
+    /// of its numbers.
     fn corners(block: &Block, offset: u32) -> [Self::V8; 3];
     /// The corners of eight triangles component by component, as a block has them.
     fn by_component(triangles: &[[&Vec3; 3]; 8]) -> [[Self::V8; 3]; 3];
@@ -202,8 +209,9 @@ pub(super) fn everywhere<V: Vector>(v: Vec3) -> [V; 3] {
 pub(super) trait Array<const N: usize>: Sized {
     fn load(values: &[f32; N]) -> Self;
     fn to_array(self) -> [f32; N];
-    /// Stores all lanes, of which some are what is there already. In a plain store the compiler sees that, and stores the others
-    /// alone, by a mask: on a Zen 4 that takes 12 cycles instead of 2 (of AVX2), and whoever loads them next waits for another 20 (of AVX-512, too).
+    /// Stores all lanes, of which some are what is there already. In a plain store the compiler sees that, and stores
+    /// the others alone, by a mask: on a Zen 4 that takes 12 cycles instead of 2 (of AVX2), and whoever loads them next
+    /// waits for another 20 (of AVX-512, too).
     fn overwrite(self, values: &mut [f32; N]);
 }
 
@@ -260,7 +268,8 @@ mod tests {
             S::V8::load(&out).at_most(S::V8::splat(0.0))
         }
 
-        /// What is entered where it is named, in the order of a sort: bits of `near` before slots, and the slot in the lowest.
+        /// What is entered where it is named, in the order of a sort: bits of `near` before slots, and the slot in the
+        /// lowest.
         fn sorted(&self) -> Vec<(u32, Child)> {
             let mut all: Vec<_> = (0..8)
                 .filter(|slot| self.named >> slot & 1 != 0)
@@ -339,7 +348,8 @@ mod tests {
         }
     }
 
-    /// The nearest child is the last of a sort; the others are the same children, each once, and in order where they are two.
+    /// The nearest child is the last of a sort; the others are the same children, each once, and in order where they
+    /// are two.
     #[test]
     fn the_nearest_child_is_told_apart() {
         for case in cases() {
@@ -358,7 +368,8 @@ mod tests {
         }
     }
 
-    /// Of entries those are kept, in their order, that a filter keeps; the lowest three bits say nothing of where a child is entered.
+    /// Of entries those are kept, in their order, that a filter keeps; the lowest three bits say nothing of where a
+    /// child is entered.
     #[test]
     fn entries_within_a_limit_are_kept() {
         for case in cases() {

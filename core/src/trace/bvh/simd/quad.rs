@@ -23,7 +23,8 @@ pub fn smallest(four: __m128) -> f32 {
     }
 }
 
-/// Half the areas of three boxes of these sizes along the axes, of which the fourth lane is anything; and a number more.
+/// Half the areas of three boxes of these sizes along the axes, of which the fourth lane is anything; and a number
+/// more.
 #[inline(always)]
 pub fn half_areas([a, b, c]: [__m128; 3]) -> __m128 {
     unsafe {

@@ -1,7 +1,7 @@
 //! Vectors of AVX2 and FMA, which AVX-512 has too.
 //!
-//! SAFETY of every block below: the vectors are made only in kernels that `isa::dispatch` runs, of an instruction set that is
-//! `Present`; loads and stores go through references to arrays of the vector's size.
+//! SAFETY of every block below: the vectors are made only in kernels that `isa::dispatch` runs, of an instruction set
+//! that is `Present`; loads and stores go through references to arrays of the vector's size.
 #![allow(unsafe_code)] // Intrinsics.
 
 use std::arch::{asm, x86_64::*};

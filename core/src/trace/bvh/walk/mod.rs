@@ -1,5 +1,6 @@
-//! One ray from the root to the leaves, by itself: among shapes, for all hits, and among triangles where it is alone ([`super::alone`]).
-//! Other rays among triangles travel in bundles ([`super::bundle`]), flights ([`super::flight`]) or packets ([`super::packet`]), whose beam takes the same walk.
+//! One ray from the root to the leaves, by itself: among shapes, for all hits, and among triangles where it is alone
+//! ([`super::alone`]). Other rays among triangles travel in bundles ([`super::bundle`]), flights ([`super::flight`]) or
+//! packets ([`super::packet`]), whose beam takes the same walk.
 //!
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
@@ -38,7 +39,8 @@ pub(super) struct Near(pub [f32; WIDTH]);
 pub(super) trait Enter {
     /// The children in which something may be hit up to `limit`; and where each is entered, not below 0.
     fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8);
-    /// Of these children, a bit each, those that are worth a visit: what enters all of them together may ask each more closely.
+    /// Of these children, a bit each, those that are worth a visit: what enters all of them together may ask each more
+    /// closely.
     #[inline(always)]
     fn select<S: Simd>(&self, _node: &Node, children: u32) -> u32 {
         children
@@ -48,8 +50,8 @@ pub(super) trait Enter {
 impl Enter for SlabRay {
     #[inline(always)]
     fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
-        // One ray comes to so few nodes that its numbers are better loaded at each than spread over vectors before the first, of which no registers
-        // could hold so many: the black box keeps the compiler from that.
+        // One ray comes to so few nodes that its numbers are better loaded at each than spread over vectors before the
+        // first, of which no registers could hold so many: the black box keeps the compiler from that.
         SlabRay::enter::<S>(std::hint::black_box(self), node, limit)
     }
 }
@@ -72,8 +74,8 @@ impl Entered {
         Entry { near: self.near.0[slot], child: node.child[slot] }
     }
 
-    /// The nearest of the children, of which there is at least one; all others go on the stack. Mostly one or two are entered: each number has its own branch,
-    /// which is predicted better than the length of a loop.
+    /// The nearest of the children, of which there is at least one; all others go on the stack. Mostly one or two are
+    /// entered: each number has its own branch, which is predicted better than the length of a loop.
     #[inline(always)]
     fn open<Q: Query>(&self, stack: &mut Stack<'_, Entry>, node: &Node) -> Entry {
         let (first, rest) = lowest(self.children);

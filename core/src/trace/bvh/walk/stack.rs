@@ -1,7 +1,8 @@
 //! Children that wait to be visited while a ray walks through a tree.
 //!
-//! The room for them lies in the frame of who walks: a walk that starts within another's leaf has room of its own, nobody clears it, and nobody
-//! lends it. Room that is cleared, the safe alternative, costs as much as a few nodes, and has to be lent for that.
+//! The room for them lies in the frame of who walks: a walk that starts within another's leaf has room of its own,
+//! nobody clears it, and nobody lends it. Room that is cleared, the safe alternative, costs as much as a few nodes, and
+//! has to be lent for that.
 #![allow(unsafe_code)] // Room that is not cleared is read where it was written.
 
 use std::mem::MaybeUninit;
@@ -44,7 +45,8 @@ impl<E: Waits> Room<E> {
     }
 }
 
-/// Children waiting, the one to be visited next on top. Apart from its room, so that the compiler keeps their number in a register.
+/// Children waiting, the one to be visited next on top. Apart from its room, so that the compiler keeps their number in
+/// a register.
 pub(in crate::trace::bvh) struct Stack<'a, E> {
     room: &'a mut Room<E>,
     /// As many entries of the room are written, from the first on; never more than there are.
@@ -147,7 +149,8 @@ mod tests {
         }
     }
 
-    /// What [`Stack::pop`] relies on, for each way to put an entry there: on top, and below all or none of those that are.
+    /// What [`Stack::pop`] relies on, for each way to put an entry there: on top, and below all or none of those that
+    /// are.
     #[test]
     fn there_is_no_more_room_than_a_tree_needs() {
         let ways: [fn(&mut Stack<'_, Entry>); 3] = [

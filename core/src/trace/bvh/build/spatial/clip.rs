@@ -2,8 +2,8 @@
 
 use crate::math::{Aabb, Vec3};
 
-/// The boxes of what lies on each side of a plane, of the triangle within `bounds`; rounded outwards. None where a side would be
-/// empty.
+/// The boxes of what lies on each side of a plane, of the triangle within `bounds`; rounded outwards. None where a side
+/// would be empty.
 pub(super) fn sides(bounds: &Aabb, corners: &[Vec3; 3], axis: usize, at: f32) -> Option<[Aabb; 2]> {
     let (mut left, mut right) = (Aabb::EMPTY, Aabb::EMPTY);
     for k in 0..3 {

@@ -1,12 +1,15 @@
 //! Triangles referenced from several places, where that is cheaper: the high preset.
 //!
-//! Splits of space and of objects are weighed by the surface area heuristic, range by range (Stich, Friedrich, Dietrich 2009, *Spatial splits in bounding
-//! volume hierarchies*). Of that only the pieces are kept, and the tree is built over these anew, as over anything else, but that large ranges are not judged by samples:
-//! which branches become nodes is chosen over more of it than a range sees. Where boxes are small and cover little but their surface, as in a scan or a terrain, no plane is looked for.
+//! Splits of space and of objects are weighed by the surface area heuristic, range by range (Stich, Friedrich, Dietrich
+//! 2009, *Spatial splits in bounding volume hierarchies*). Of that only the pieces are kept, and the tree is built over
+//! these anew, as over anything else, but that large ranges are not judged by samples: which branches become nodes is
+//! chosen over more of it than a range sees. Where boxes are small and cover little but their surface, as in a scan or
+//! a terrain, no plane is looked for.
 //!
-//! Cut beforehand, where planes pass that will divide the scene anyway (Ernst, Greiner 2007, *Early split clipping for bounding volume hierarchies*;
-//! Karras, Aila 2013, *Fast parallel construction of high-quality bounding volume hierarchies*), which is simpler and takes less time, a soup of large triangles
-//! over a mesh was traced at half the rate that it had uncut.
+//! Cut beforehand, where planes pass that will divide the scene anyway (Ernst, Greiner 2007, *Early split clipping for
+//! bounding volume hierarchies*; Karras, Aila 2013, *Fast parallel construction of high-quality bounding volume
+//! hierarchies*), which is simpler and takes less time, a soup of large triangles over a mesh was traced at half the
+//! rate that it had uncut.
 //!
 //! | file | idea |
 //! | --- | --- |
@@ -40,10 +43,12 @@ use task::TaskKernel;
 /// New references for each triangle, at most.
 const BUDGET: f64 = 0.3;
 
-/// A range is left as it is where its boxes have no more than this many times the surface of the box around them, and none is large.
+/// A range is left as it is where its boxes have no more than this many times the surface of the box around them, and
+/// none is large.
 const COVERED: f64 = 4.0;
 
-/// A box is large that has this many times the mean surface of its range's boxes, and this share of that of the box around them.
+/// A box is large that has this many times the mean surface of its range's boxes, and this share of that of the box
+/// around them.
 const LARGE_BOX: (f64, f64) = (4.0, 1.0 / 32.0);
 
 /// What of the whole surface the sides of a division may have in common before a plane is looked for that cuts.
@@ -284,7 +289,8 @@ mod tests {
         pieces.iter().map(|piece| piece.0.map(f32::to_bits)).collect()
     }
 
-    /// Every point of a triangle is in a piece, which is no larger than the triangle; and there are not more than there may be.
+    /// Every point of a triangle is in a piece, which is no larger than the triangle; and there are not more than there
+    /// may be.
     #[test]
     fn pieces_cover_their_triangles() {
         // Of one thread, and of several.
@@ -368,8 +374,9 @@ mod tests {
         }
     }
 
-    /// Cut by planes that are only guessed, triangles over a surface gave a tree that cost more than uncut; a few that are much larger than all else, among pieces
-    /// of which a sample sees none, made nodes that cost more than what is in them.
+    /// Cut by planes that are only guessed, triangles over a surface gave a tree that cost more than uncut; a few that
+    /// are much larger than all else, among pieces of which a sample sees none, made nodes that cost more than what is
+    /// in them.
     #[test]
     fn trees_cost_less_than_of_what_is_whole() {
         let floor = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| Vec3::new(x, y, -0.1));

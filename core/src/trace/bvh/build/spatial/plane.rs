@@ -23,7 +23,8 @@ impl Plane {
         self.cost < cost(sides) && cut <= spare as u64
     }
 
-    /// What is left of it and what is right of it, of which at most `spare` are on both sides. What costs less when it is on one side whole is there.
+    /// What is left of it and what is right of it, of which at most `spare` are on both sides. What costs less when it
+    /// is on one side whole is there.
     pub fn sides_of(&self, items: &[Record], meshes: &Meshes, spare: usize) -> [Vec<Record>; 2] {
         let mut found = self.sides.map(|side| Vec::with_capacity(side.count as usize));
         self.part(items, meshes, spare, &mut found);

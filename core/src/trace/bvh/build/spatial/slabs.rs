@@ -1,4 +1,5 @@
-//! The best plane that cuts what it passes: parts of triangles between equidistant planes, on all three axes in one pass.
+//! The best plane that cuts what it passes: parts of triangles between equidistant planes, on all three axes in one
+//! pass.
 
 use super::super::bins::{add_up, join_boxes, swept};
 use super::super::record::Record;
@@ -133,7 +134,8 @@ impl<const N: usize> Slabs<N> {
         is_cut
     }
 
-    /// Adds its parts on one axis: of each edge what lies between two planes. That is for a choice only, and may be off by rounding.
+    /// Adds its parts on one axis: of each edge what lies between two planes. That is for a choice only, and may be off
+    /// by rounding.
     #[inline(always)]
     fn add_parts<S: Simd>(
         &mut self,

@@ -1,17 +1,23 @@
-//! Rays that run the same way, as an orthographic camera's and those towards a distant light: a bundle whose common point is infinitely far away ([`Pencil`]).
+//! Rays that run the same way, as an orthographic camera's and those towards a distant light: a bundle whose common
+//! point is infinitely far away ([`Pencil`]).
 //!
-//! Everything is sheared so that the rays run along the bundle's axis: a ray is a point of the plane across it, a triangle its shadow there. Edge functions of the shadow
-//! do not ask how far away anything is, and t' is linear in the point, so that it needs no division.
+//! Everything is sheared so that the rays run along the bundle's axis: a ray is a point of the plane across it, a
+//! triangle its shadow there. Edge functions of the shadow do not ask how far away anything is, and t' is linear in the
+//! point, so that it needs no division.
 //!
-//! The bundle's origin is beside one ray's, as far back as the rearmost, so that no t' is below 0. Let u = 2^-24, (k, l) be the slopes, at most 1 and off by u of themselves,
-//! X and Z the largest components of rays' origins relative to the bundle's, across its axis and along it, and R the largest component of rays' points. A point x - k z is off by
-//! e = u (3 X + 6 Z) (both differences, slope, product and difference: 2 X + 4 Z; the rest is spare), and R <= X + Z. The bundle's blur is e + 8 u R, rounded up.
+//! The bundle's origin is beside one ray's, as far back as the rearmost, so that no t' is below 0. Let u = 2^-24, (k,
+//! l) be the slopes, at most 1 and off by u of themselves, X and Z the largest components of rays' origins relative to
+//! the bundle's, across its axis and along it, and R the largest component of rays' points. A point x - k z is off by
+//! e = u (3 X + 6 Z) (both differences, slope, product and difference: 2 X + 4 Z; the rest is spare), and R <= X + Z. The
+//! bundle's blur is e + 8 u R, rounded up.
 //!
-//! **Boxes.** A ray meets x = c at c / k - p / k. In lengths, 1 / k, product and difference round p by 4 u R; what they round c by is that of a bundle with a point
-//! in common. A slope next to zero is taken for 2^-40, for which boxes are wider by 2^-39 of how far rays go in the tree.
+//! **Boxes.** A ray meets x = c at c / k - p / k. In lengths, 1 / k, product and difference round p by 4 u R; what they
+//! round c by is that of a bundle with a point in common. A slope next to zero is taken for 2^-40, for which boxes are
+//! wider by 2^-39 of how far rays go in the tree.
 //!
-//! **Placed objects.** In the tree of placements they are a bundle; from there on each goes by itself, for in an object's coordinates each of their origins would be
-//! off in its own way. Shadow rays wait there for those of other bundles, and fly.
+//! **Placed objects.** In the tree of placements they are a bundle; from there on each goes by itself, for in an
+//! object's coordinates each of their origins would be off in its own way. Shadow rays wait there for those of other
+//! bundles, and fly.
 //!
 //! **Triangles**: [`triangles`].
 
@@ -42,8 +48,8 @@ const MIN_SLOPE: f32 = 1.0 / (1_u64 << 40) as f32;
 /// Directions that are shorter along the bundle's axis make none, for t' counts in units of it.
 const SHORTEST: f32 = 1e-30;
 
-/// Nor do directions that are longer: a t next to 0 is rounded by half of the least number there is, and in t' that is so many times as much, which has to be nothing beside
-/// [`TINY`](super::rays::TINY).
+/// Nor do directions that are longer: a t next to 0 is rounded by half of the least number there is, and in t' that is
+/// so many times as much, which has to be nothing beside [`TINY`](super::rays::TINY).
 const LONGEST: f32 = 1e8;
 
 /// Whether rays may have a direction in common, and no point.

@@ -1,6 +1,7 @@
 //! Triangles as parallel rays see them: shadows across the bundle's axis, with bounds on the rounding.
 //!
-//! Names are those of [`super`]. With L the largest component of a corner relative to the origin, and s that of an edge:
+//! Names are those of [`super`]. With L the largest component of a corner relative to the origin, and s that of an
+//! edge:
 //!
 //! | value | rounding | rays off |
 //! | --- | --- | --- |
@@ -10,12 +11,13 @@
 //! | area of the shadow | 60 u s^2 | 0 |
 //! | area times t' | s^2 (64 u L + 28 u R): as the height of an origin, and the plane's slopes times (p, q) | 4 e s^2 |
 //!
-//! Edge functions are taken to be off by s (128 u L + 8 blur), areas by 64 u s^2 and areas times t' by s^2 (128 u L + 8 blur); and
-//! t' by d, which is this over the area, what the area is off by times L, and a few roundings of L. The area is known to a quarter of itself, or the triangle
-//! is left in doubt; and a hit is sure only if t', as computed, is more than 5 d beyond the ray's own origin, so that its t is known to a quarter, too.
+//! Edge functions are taken to be off by s (128 u L + 8 blur), areas by 64 u s^2 and areas times t' by s^2 (128 u L + 8
+//! blur); and t' by d, which is this over the area, what the area is off by times L, and a few roundings of L. The area
+//! is known to a quarter of itself, or the triangle is left in doubt; and a hit is sure only if t', as computed, is
+//! more than 5 d beyond the ray's own origin, so that its t is known to a quarter, too.
 //!
-//! A ray's own origin is on a surface most often. On which side of the plane, t' is too coarse to tell, but C . N does, C leading from there to a corner, as in
-//! [`Edges`].
+//! A ray's own origin is on a surface most often. On which side of the plane, t' is too coarse to tell, but C . N does,
+//! C leading from there to a corner, as in [`Edges`].
 
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::{Block, LANES};
