@@ -11,6 +11,8 @@ use twincast::math::Vec3;
 use twincast::trace::bvh::{Bvh, Isa, Options};
 use twincast::{Batch, Error, Hit, Ray, Tracer, World};
 
+use crate::skip::skip;
+
 /// How many rays of each kind hit something.
 fn hits(subject: &Subject) -> [usize; 3] {
     let bvh = Bvh::build(&subject.world);
@@ -81,7 +83,7 @@ fn rays_of_a_direction_are_where_those_of_a_point_are() {
 fn the_rays_on_a_scan_with_z_up_are_those_of_embree_ref() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/models/nefertiti.obj");
     if !path.exists() {
-        eprintln!("skipped: {} is missing", path.display());
+        skip(format_args!("{} is missing", path.display()));
         return;
     }
     let (subject, _) = Subject::new(path.to_str().expect("UTF-8"), UpAxis::Z).unwrap();

@@ -77,10 +77,11 @@ mod with_the_library {
     use twincast::{Image, Renderer, Settings, World};
 
     use super::*;
+    use crate::skip::skip;
 
     /// A library that is there; none, with a word, where there is none.
     fn denoiser() -> Option<Denoiser> {
-        Denoiser::find().inspect_err(|error| eprintln!("left off: {error}")).ok()
+        Denoiser::find().inspect_err(|error| skip(error)).ok()
     }
 
     /// The room, as it is seen with so many samples.

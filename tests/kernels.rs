@@ -5,13 +5,15 @@
 
 use std::process::{Command, Stdio};
 
+use crate::skip::skip;
+
 /// What kernels are inlined into.
 const KERNELS: &str = "twincast_core::trace::bvh::simd::isa::";
 
 #[test]
 fn nothing_but_kernels_calls_vector_instructions() {
     if !cfg!(target_arch = "x86_64") {
-        eprintln!("skipped: kernels have instruction sets of their own on x86-64 alone");
+        skip("kernels have instruction sets of their own on x86-64 alone");
         return;
     }
     let listing = Command::new("objdump")
@@ -19,7 +21,7 @@ fn nothing_but_kernels_calls_vector_instructions() {
         .stderr(Stdio::null())
         .output();
     let Ok(listing) = listing else {
-        eprintln!("skipped: there is no objdump (Debian: apt-get install binutils)");
+        skip("there is no objdump (Debian: apt-get install binutils)");
         return;
     };
     let text = String::from_utf8_lossy(&listing.stdout);

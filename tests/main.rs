@@ -29,4 +29,5 @@ mod render;
 mod resume;
 mod scenes;
 mod shapes;
+mod skip;
 mod stress;

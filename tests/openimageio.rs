@@ -7,6 +7,7 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use crate::program::{command, text};
+use crate::skip::skip;
 
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/box/box.toml");
 
@@ -116,10 +117,10 @@ fn a_full_disk_keeps_the_old_picture() {
              cat {disk}/a.{suffix}; ls -A {disk}; exit $status"
         );
         let run = std::process::Command::new("unshare").args(["--mount", "sh", "-c", &mounted]).output();
-        let Ok(output) = run.map_err(|error| eprintln!("skipped: no unshare: {error}")) else { return };
+        let Ok(output) = run.map_err(|error| skip(format_args!("no unshare: {error}"))) else { return };
         let words = text(&output.stderr);
         if output.status.code() == Some(99) || words.starts_with("unshare:") {
-            return eprintln!("skipped: no file system may be mounted: {words}");
+            return skip(format_args!("no file system may be mounted: {words}"));
         }
         assert_eq!(output.status.code(), Some(4), "{suffix}: {words}");
         assert!(words.contains("writ") && words.contains("No space left on device"), "{words}");

@@ -102,10 +102,23 @@ impl BuildArgs {
             max_memory: self.max_memory,
             wanted: self.build.0,
         };
-        let refuse = |backend, problem: NotEnoughMemory| Error::Backend { backend, message: problem.to_string() };
+        let refuse = |backend, problem: NotEnoughMemory| {
+            let message = format!("{problem}; {}", advice(&problem));
+            Error::Backend { backend, message }
+        };
         if backend == BackendArg::Embree {
             return request.fits().map(|()| None).map_err(|problem| refuse("embree", problem));
         }
         request.choose().map(Some).map_err(|problem| refuse("native", problem))
     }
+}
+
+/// Which flags would do.
+fn advice(problem: &NotEnoughMemory) -> String {
+    let instead = match problem.preset {
+        Some(Preset::FastCompact) => "a smaller mesh or picture",
+        Some(_) => "--build auto, which may choose a smaller one",
+        None => "use --backend native, which may need less",
+    };
+    format!("give at least --max-memory {}M, or {instead}", problem.enough().div_ceil(1 << 20))
 }

@@ -77,7 +77,8 @@ pub fn load_watched(
         Error::input(path, "", message)
     })?;
     if !format.has_animations() && (options.animation != Animation::default() || options.variant.is_some()) {
-        let message = "animations (--animation, --time, --frames) and variants of materials (--variant) are asked for, which only glTF and GLB have; leave them out";
+        let message =
+            "an animation, a time or a variant of materials is asked for, which only glTF and GLB have; leave them out";
         return Err(Error::input(path, "", message));
     }
     let mut warnings = Vec::new();

@@ -98,10 +98,10 @@ impl Renderer<'_> {
             if done > self.most_samples() {
                 let message =
                     format!("says that {done} samples of a pixel are done, of {} at most", self.most_samples());
-                return Err(Error::input(path, "", message + "; begin anew without --resume"));
+                return Err(Error::input(path, "", message + "; begin anew instead of resuming"));
             }
             let channels = image::read_channels(path)?;
-            let broken = || Error::input(path, "", "is no whole checkpoint: leave out --resume to begin anew");
+            let broken = || Error::input(path, "", "is no whole checkpoint: begin anew instead of resuming");
             fill(&mut canvas, &channels).ok_or_else(broken)?;
             // A pixel that goes on has the samples with which the round began, or those with which it ends.
             let ends = [done, self.next_round(done, true)];
@@ -119,7 +119,7 @@ impl Renderer<'_> {
 fn same_render(path: &Path, identity: &[(&'static str, String)]) -> Result<u32> {
     let refuse = |message: String| Error::input(path, "", message);
     if !path.exists() {
-        return Err(refuse("there is no checkpoint to resume: leave out --resume to begin anew".to_owned()));
+        return Err(refuse("there is no checkpoint to resume: begin anew".to_owned()));
     }
     let Metadata { texts, .. } = image::read_metadata(path)?;
     let entry = |key: &str| {
@@ -140,7 +140,7 @@ fn same_render(path: &Path, identity: &[(&'static str, String)]) -> Result<u32> 
                 false if *key == "settings" => format!("{key}: another {name}"),
                 false => (*key).to_owned(),
             };
-            return Err(refuse(format!("is of another render, by its {difference}; begin anew without --resume")));
+            return Err(refuse(format!("is of another render, by its {difference}; begin anew instead of resuming")));
         }
     }
     entry(ROUND)?.parse().map_err(|_| refuse("does not say how far it is".to_owned()))

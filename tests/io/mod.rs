@@ -25,6 +25,8 @@ use twincast::math::{DVec3, Vec3};
 use twincast::scene::{Geometry, Mesh};
 use twincast::{Error, Scene, Warning};
 
+use crate::skip::skip;
+
 /// A folder with files, which goes away with it.
 pub struct Files(TempDir);
 
@@ -328,7 +330,7 @@ fn triangles_with_corners_that_are_not_finite_are_counted() {
 pub fn model(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/models").join(name);
     if !path.is_file() {
-        eprintln!("skipped: {} is missing", path.display());
+        skip(format_args!("{} is missing", path.display()));
         return None;
     }
     Some(path)

@@ -141,26 +141,22 @@ impl BuildRequest {
 
 impl fmt::Display for NotEnoughMemory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mega = |bytes: u64| bytes.div_ceil(1 << 20);
         let Self { preset, needed, limit } = self;
-        // What is held moves a little from run to run; what is asked for should be enough in the next one.
-        let enough = mega(needed + needed / 32);
-        let needed = mega(*needed);
+        let needed = needed.div_ceil(1 << 20);
         let limit = if *limit < 1 << 20 { format!("{} KiB", limit >> 10) } else { format!("{} MiB", limit >> 20) };
         match preset {
             Some(preset) => write!(f, "its {} build", preset.name())?,
             None => write!(f, "its build")?,
         }
-        write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit}; ")?;
-        match preset {
-            Some(Preset::FastCompact) => {
-                write!(f, "give at least --max-memory {enough}M, or a smaller mesh or picture")
-            }
-            Some(_) => {
-                write!(f, "give at least --max-memory {enough}M, or --build auto, which may choose a smaller one")
-            }
-            None => write!(f, "give at least --max-memory {enough}M, or use --backend native, which may need less"),
-        }
+        write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit}")
+    }
+}
+
+impl NotEnoughMemory {
+    /// A limit that will do, bytes. What is held moves a little from run to run; what is asked for should be enough in
+    /// the next one.
+    pub const fn enough(&self) -> u64 {
+        self.needed + self.needed / 32
     }
 }
 
@@ -220,18 +216,18 @@ mod tests {
         assert_eq!(at(37), None);
         let error = BuildRequest { max_memory: Some(held), ..MESH }.choose().unwrap_err();
         assert_eq!(error, NotEnoughMemory { preset: Some(FastCompact), needed: held + 38_000_000, limit: held });
-        let text = error.to_string();
+        let (text, enough) = (error.to_string(), error.enough());
         let error = BuildRequest { max_memory: Some(held - 1), ..MESH }.fits().unwrap_err();
         assert_eq!((error.needed, MESH.fits()), (held, Ok(())));
-        // What the message asks for is enough.
+        // What it says is needed is enough.
         assert!(text.contains("about 537 MiB") && text.contains("limit of 500 MiB"), "{text}");
         assert!(preset(many, Some(537 << 20)).is_some() && preset(many, Some(536 << 20)).is_none());
         // A thirty-second more.
-        assert!(text.contains("--max-memory 553M, or a smaller mesh"), "{text}");
+        assert_eq!(enough.div_ceil(1 << 20), 553);
         // Where there is nothing to build, no other build would do.
-        let none =
-            BuildRequest { triangles: 0, max_memory: Some(1000 << 10), ..MESH }.choose().unwrap_err().to_string();
-        assert!(none.contains("limit of 1000 KiB") && !none.contains("--build auto"), "{none}");
+        let none = BuildRequest { triangles: 0, max_memory: Some(1000 << 10), ..MESH }.choose().unwrap_err();
+        assert_eq!(none.preset, Some(FastCompact));
+        assert!(none.to_string().contains("limit of 1000 KiB"), "{none}");
     }
 
     #[test]

@@ -80,7 +80,7 @@ fn unable(placement: &Placement) -> Error {
         backend: "embree",
         message: format!(
             "instance {} is placed by a transform that Embree's f32 cannot invert for this scene; scale it up, or use \
-             --backend native",
+             the native engine",
             placement.instance
         ),
     }

@@ -50,7 +50,9 @@ impl<'a> Clip<'a> {
                 0 => return Err(told("a time of an animation is asked for".into())),
                 1 => chosen.push(0),
                 _ => {
-                    return Err(told("it has to be said which animations are meant (--animation NAME, or all)".into()));
+                    return Err(told(
+                        "it has to be said which animations are meant (by name or number, or all)".into(),
+                    ));
                 }
             }
         }
