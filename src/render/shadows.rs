@@ -62,8 +62,9 @@ impl Shadows {
                 continue;
             }
             radiance[pixel as usize] += (contribution * share).extend(0.0);
-            if let Some(tally) = &mut tally {
-                tally.add_parts(pixel, &self.parts[i], share);
+            // There are parts where light is told apart, and not for other channels.
+            if let (Some(tally), Some(parts)) = (&mut tally, self.parts.get(i)) {
+                tally.add_parts(pixel, parts, share);
             }
         }
     }

@@ -269,11 +269,11 @@ fn faults_are_told_with_line_and_remedy() {
         ("[[sphere]]\nradius = 1\n", 1, "[[sphere]] lacks \"centre\""),
         ("[[fog]]\nabsorption = 1\n", 1, "several tables [[fog]] where there is one; write [fog]"),
         ("[[material.red]]\ncolor = 1\n", 1, "write [material.red]"),
-        ("[[camera]]\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\nlens = [0.1, 7]\n", 4, "a list of 2"),
+        ("[[camera]]\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\nlens = [0.1, 7]\n", 4, "[0.1, 7] where \"lens\" wants a table"),
         ("[[cone]]\nbase = [0, 0, 0]\napex = [0, 1, 0]\napex_radius = 0.5\n", 1, "lacks \"base_radius\""),
-        ("[[sphere]]\ncentre = [0, 0]\nradius = 1\n", 2, "a list of 2 where \"centre\" wants a list of 3 numbers"),
-        ("[[sphere]]\ncentre = [0, 0, nan]\nradius = 1\n", 2, "\"nan\" where \"centre\" wants a finite number"),
-        ("[[sphere]]\ncentre = [0, 0, 0]\nradius = \"1\"\n", 3, "\"1\" where \"radius\" wants a finite number"),
+        ("[[sphere]]\ncentre = [0, 0]\nradius = 1\n", 2, "[0, 0] where \"centre\" wants a list of 3 numbers"),
+        ("[[sphere]]\ncentre = [0, 0, nan]\nradius = 1\n", 2, "nan where \"centre\" wants a finite number"),
+        ("[[sphere]]\ncentre = [0, 0, 0]\nradius = \"1\"\n", 3, "the text \"1\" where \"radius\" wants a finite number"),
         ("[[sphere]]\ncentre = [0, 0, 0]\nradius = -1\n", 1, "the radius is -1"),
         (
             "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"rde\"\n[material.red]\n",
@@ -330,7 +330,7 @@ fn faults_are_told_with_line_and_remedy() {
             4,
             "of at most",
         ),
-        ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),
+        ("[render]\nspp = 1.5\n", 2, "1.5 where \"spp\" wants a whole number from 1 to"),
         ("[render]\naccel = \"octre\"\n", 2, "did you mean \"octree\"?"),
         ("[render]\ngrid = 5\n", 2, "write that, too"),
         ("[render]\naccel = \"grid\"\ngrid = [1, 2]\n", 3, "one number of cells or three"),
@@ -338,7 +338,8 @@ fn faults_are_told_with_line_and_remedy() {
         ("[render]\ntriangle_method = \"woop\"\n", 2, "write accel = \"binary-bvh\" or another"),
         ("[render]\naccel = \"bvh\"\nsphere_method = \"geometric\"\n", 3, "bvh and brute are exact"),
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
-        ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
+        ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = [0, 0, 0]\n", 4, "divides by zero"),
+        ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 2\n", 4, "three numbers [c0, c1, c2]"),
         (
             "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nradiance = 1\nhalf_edges = [[1, 0, 0], [2, 0, 0]]\n",
             5,
@@ -391,9 +392,9 @@ fn faults_are_told_with_line_and_remedy() {
         (
             "[[mesh]]\npositions = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]\n",
             3,
-            "\"1\" where \"triangles\" wants a whole number from 0 to 0",
+            "1 where \"triangles\" wants a whole number from 0 to 0",
         ),
-        ("[[instance]]\ngroup = \"b\"\n", 2, "no [group.b]"),
+        ("[[instance]]\ngroup = \"b\"\n", 2, "no [group.b]; there is no [group.NAME] in this file"),
         (
             "[[group.a.instance]]\ngroup = \"b\"\n[[group.b.instance]]\ngroup = \"a\"\n",
             4,
@@ -404,7 +405,7 @@ fn faults_are_told_with_line_and_remedy() {
         (
             "[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {scale = 0}\n",
             3,
-            "\"a\" has a transform that nothing undoes",
+            "\"a\" has a singular transform",
         ),
         ("[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {}\n", 4, "an empty step"),
         (
