@@ -269,11 +269,19 @@ fn faults_are_told_with_line_and_remedy() {
         ("[[sphere]]\nradius = 1\n", 1, "[[sphere]] lacks \"centre\""),
         ("[[fog]]\nabsorption = 1\n", 1, "several tables [[fog]] where there is one; write [fog]"),
         ("[[material.red]]\ncolor = 1\n", 1, "write [material.red]"),
-        ("[[camera]]\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\nlens = [0.1, 7]\n", 4, "[0.1, 7] where \"lens\" wants a table"),
+        (
+            "[[camera]]\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\nlens = [0.1, 7]\n",
+            4,
+            "[0.1, 7] where \"lens\" wants a table",
+        ),
         ("[[cone]]\nbase = [0, 0, 0]\napex = [0, 1, 0]\napex_radius = 0.5\n", 1, "lacks \"base_radius\""),
         ("[[sphere]]\ncentre = [0, 0]\nradius = 1\n", 2, "[0, 0] where \"centre\" wants a list of 3 numbers"),
         ("[[sphere]]\ncentre = [0, 0, nan]\nradius = 1\n", 2, "nan where \"centre\" wants a finite number"),
-        ("[[sphere]]\ncentre = [0, 0, 0]\nradius = \"1\"\n", 3, "the text \"1\" where \"radius\" wants a finite number"),
+        (
+            "[[sphere]]\ncentre = [0, 0, 0]\nradius = \"1\"\n",
+            3,
+            "the text \"1\" where \"radius\" wants a finite number",
+        ),
         ("[[sphere]]\ncentre = [0, 0, 0]\nradius = -1\n", 1, "the radius is -1"),
         (
             "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"rde\"\n[material.red]\n",
@@ -402,11 +410,7 @@ fn faults_are_told_with_line_and_remedy() {
         ),
         (&deep, 1, "nested more than 64 deep"),
         (&many, 1, "placements of groups"),
-        (
-            "[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {scale = 0}\n",
-            3,
-            "\"a\" has a singular transform",
-        ),
+        ("[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {scale = 0}\n", 3, "\"a\" has a singular transform"),
         ("[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {}\n", 4, "an empty step"),
         (
             "[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = [{scale = 2, translate = [0, 0, 0]}]\n",
