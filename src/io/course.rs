@@ -22,7 +22,9 @@ use super::text::{name, quoted};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DVec3, Vec3, can_place, is_invertible, rotation, similarity};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Camera, Geometry, Instance, Integrator, Light, Material, Scene, Specular, Unlit};
+use crate::scene::{
+    Attenuation, Camera, DefaultLighting, Geometry, Instance, Integrator, Light, Material, Scene, Specular,
+};
 use crate::shape::{Shape, Sphere};
 
 /// Every statement as it should look; the first word is the keyword.
@@ -250,7 +252,7 @@ impl Reader {
         scene.background = Some(Vec3::ZERO);
         // Of which the format's formula is the first terms.
         scene.request.integrator = Some(Integrator::Whitted);
-        scene.unlit = Unlit::Darkness;
+        scene.default_lighting = DefaultLighting::None;
         self.parts.show(&mut scene);
         // One unit sphere for each material that needs it.
         let mut groups = HashMap::new();

@@ -85,7 +85,7 @@ fn scene(scene: &Scene) -> u128 {
         materials,
         textures,
         lights,
-        unlit,
+        default_lighting,
         cameras: _,
         ambient,
         environment,
@@ -116,7 +116,7 @@ fn scene(scene: &Scene) -> u128 {
         digest.add_all(&transform.to_cols_array());
         digest.add_all(&transform_end.map(|end| end.to_cols_array()).unwrap_or_default());
     }
-    digest.add(&(materials, lights, unlit, ambient, background, fog));
+    digest.add(&(materials, lights, default_lighting, ambient, background, fog));
     for Texture { name, width, height, pixels, wrap_u, wrap_v, filter, on_second_uvs, transform } in textures {
         digest.add(&(name, width, height, wrap_u, wrap_v, filter, on_second_uvs, transform));
         match pixels {

@@ -1,7 +1,7 @@
 //! The ray tracer course format.
 
 use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Attenuation, Fov, Geometry, Light, Projection, Scene, Unlit};
+use twincast::scene::{Attenuation, DefaultLighting, Fov, Geometry, Light, Projection, Scene};
 use twincast::trace::bvh::Bvh;
 use twincast::{Ray, Shape, Tracer, World};
 
@@ -124,7 +124,7 @@ fn equal_materials_are_one() {
 #[test]
 fn without_lights_there_is_no_headlight() {
     let scene = scene("ambient 0.5 0 0\nsphere 0 0 0 1\n");
-    assert_eq!((scene.lights.len(), scene.unlit), (0, Unlit::Darkness));
+    assert_eq!((scene.lights.len(), scene.default_lighting), (0, DefaultLighting::None));
 }
 
 #[test]

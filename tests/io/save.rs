@@ -5,7 +5,7 @@ use std::sync::Arc;
 use twincast::io::save;
 use twincast::math::{DAffine3, DVec2, DVec3, Vec3, Vec4};
 use twincast::scene::{
-    Absorption, Camera, Fov, Geometry, Interface, Material, Mesh, Projection, RECIPES, Scene, Unlit,
+    Absorption, Camera, DefaultLighting, Fov, Geometry, Interface, Material, Mesh, Projection, RECIPES, Scene,
 };
 use twincast::shade::{Attributes, SurfacePoint};
 use twincast::trace::brute::Brute;
@@ -319,13 +319,14 @@ fn every_shape_comes_back_from_toml() {
 fn darkness_stays_dark() {
     let files = Files::one("dark.test", "ambient 0.5 0 0\nsphere 0 0 0 1\n");
     let dark = files.scene("dark.test");
-    assert_eq!((dark.lights.len(), dark.unlit), (0, Unlit::Darkness));
+    assert_eq!((dark.lights.len(), dark.default_lighting), (0, DefaultLighting::None));
     save(&dark, &files.path("dark.toml")).unwrap();
     let again = files.scene("dark.toml");
-    assert_eq!((again.lights.len(), again.unlit), (0, Unlit::Darkness));
-    let lit_from_the_eye = Scene { unlit: Unlit::Headlight, lights: Vec::new(), ..RECIPES[0].make(1) };
+    assert_eq!((again.lights.len(), again.default_lighting), (0, DefaultLighting::None));
+    let lit_from_the_eye =
+        Scene { default_lighting: DefaultLighting::Headlight, lights: Vec::new(), ..RECIPES[0].make(1) };
     save(&lit_from_the_eye, &files.path("b.toml")).unwrap();
-    assert_eq!(files.scene("b.toml").unlit, Unlit::Headlight);
+    assert_eq!(files.scene("b.toml").default_lighting, DefaultLighting::Headlight);
     let error = save(&lit_from_the_eye, &files.path("b.nff")).unwrap_err().to_string();
     assert!(error.contains("light from the viewer") && error.contains(".toml"), "{error}");
 }

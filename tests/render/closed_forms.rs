@@ -4,7 +4,8 @@
 use twincast::math::{DVec3, Vec3, Vec4};
 use twincast::render::{Filter, Sampling};
 use twincast::scene::{
-    AreaShape, Attenuation, Camera, Fov, Geometry, Integrator, Light, Material, Mesh, Projection, ThinLens, Unlit,
+    AreaShape, Attenuation, Camera, DefaultLighting, Fov, Geometry, Integrator, Light, Material, Mesh, Projection,
+    ThinLens,
 };
 use twincast::{Image, Scene, Settings, Shape, Sphere, World};
 
@@ -106,7 +107,10 @@ fn a_point_out_of_focus_becomes_a_disk() {
     for (distance, point) in [(3.0, 0.03), (10.0, 0.05)] {
         let ball = Shape::Sphere(Sphere { centre: Vec3::Z * -distance as f32, radius: point as f32 });
         let shapes = Geometry::Shapes { shapes: vec![ball], material: 0 };
-        let scene = Scene { unlit: Unlit::Darkness, ..Scene::from_geometries(vec![shapes], vec![glow.clone()]) };
+        let scene = Scene {
+            default_lighting: DefaultLighting::None,
+            ..Scene::from_geometries(vec![shapes], vec![glow.clone()])
+        };
         let camera = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 1.0).unwrap();
         let blur = lens * (focus - distance).abs() / distance;
         let radius = blur + point * focus / distance;

@@ -1,7 +1,7 @@
 //! Fog, against Beer's law: of radiance L, T L + (1 - T) C arrives after d metres, T = exp(-a d).
 
 use twincast::math::{DVec3, Vec3, Vec4};
-use twincast::scene::{Camera, Environment, Fog, Geometry, Integrator, Light, Material, Unlit};
+use twincast::scene::{Camera, DefaultLighting, Environment, Fog, Geometry, Integrator, Light, Material};
 use twincast::{Cuboid, Image, Plane, Scene, Settings, Shape, Sphere, World};
 
 use super::{engines, matte, render, settings};
@@ -35,7 +35,7 @@ fn scene(parts: Vec<(Shape, Material)>, reach: f32) -> Scene {
     let (shapes, materials): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
     let geometry = |(shape, material)| Geometry::Shapes { shapes: vec![shape], material };
     let geometries = shapes.into_iter().zip(0..).map(geometry).collect();
-    Scene { fog: fog(reach), unlit: Unlit::Darkness, ..Scene::from_geometries(geometries, materials) }
+    Scene { fog: fog(reach), default_lighting: DefaultLighting::None, ..Scene::from_geometries(geometries, materials) }
 }
 
 /// From 5 before the origin along -z.

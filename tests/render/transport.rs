@@ -505,7 +505,7 @@ fn auto_traces_paths_where_nothing_else_shows_anything() {
     assert_eq!(of(Some(Integrator::Whitted)).2.pixels[0].truncate(), Vec3::ZERO);
     // So it is where nothing glows but what is behind everything.
     let mut under = scene(vec![(sphere(Vec3::ZERO, 1.0), matte(0.5))]);
-    under.unlit = twincast::scene::Unlit::Darkness;
+    under.default_lighting = twincast::scene::DefaultLighting::None;
     let chosen = |scene: &Scene| {
         let world = World::new(scene).unwrap();
         let camera = Camera::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, 0.5).unwrap();

@@ -33,7 +33,7 @@ pub use work::{ROULETTE_MIN_DEPTH, Rays, Work};
 
 use crate::error::Result;
 use crate::math::Vec3;
-use crate::scene::{Fog, Integrator, Scene, Unlit};
+use crate::scene::{DefaultLighting, Fog, Integrator, Scene};
 use crate::shade::Attributes;
 use crate::shade::light::LightSource;
 use crate::shade::lights::has_emitters;
@@ -247,7 +247,7 @@ impl PlanInputs<'_> {
     fn integrator(&self) -> (Integrator, &'static str) {
         let Self { scene, options, census, .. } = self;
         let has_lights = !scene.lights.is_empty() || scene.environment.is_some();
-        let is_meant_dark = scene.unlit == Unlit::Darkness || has_lights;
+        let is_meant_dark = scene.default_lighting == DefaultLighting::None || has_lights;
         let asked = integrator::Needs {
             sends_on: census.materials.sending_on > 0,
             is_lit: census.materials.lit > 0,
@@ -272,7 +272,9 @@ impl PlanInputs<'_> {
         if !self.reflects(integrator) {
             return Lighting::None;
         }
-        let is_unlit = scene.unlit == Unlit::Headlight && scene.lights.is_empty() && scene.environment.is_none();
+        let is_unlit = scene.default_lighting == DefaultLighting::Headlight
+            && scene.lights.is_empty()
+            && scene.environment.is_none();
         let finds_light = || integrator == Integrator::Path && (self.shines() || self.has_bodies());
         if is_unlit && !finds_light() { Lighting::Headlight } else { Lighting::Lights(census.lights.reaching.clone()) }
     }
@@ -353,7 +355,7 @@ mod tests {
 
     #[test]
     fn a_scene_that_is_meant_to_be_dark_has_no_headlight() {
-        let dark = Scene { unlit: Unlit::Darkness, ..scene() };
+        let dark = Scene { default_lighting: DefaultLighting::None, ..scene() };
         assert_eq!(plan(&dark).lighting, Lighting::Lights(Vec::new()));
         assert!(!plan(&dark).shadows() && plan(&dark).to_string().contains("no light"));
     }

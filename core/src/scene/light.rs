@@ -85,12 +85,12 @@ pub enum Light {
 
 /// What a scene without lights is lit by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Unlit {
+pub enum DefaultLighting {
     /// A light that the viewer carries: for formats that know shapes alone.
     #[default]
     Headlight,
     /// Nothing: the file describes all light there is.
-    Darkness,
+    None,
 }
 
 /// The surface of a light.

@@ -29,7 +29,7 @@ pub use check::fault;
 pub use environment::Environment;
 pub use fog::Fog;
 pub use instance::{Group, Instance};
-pub use light::{AreaShape, Attenuation, Light, Unlit};
+pub use light::{AreaShape, Attenuation, DefaultLighting, Light};
 pub use material::{Absorption, Alpha, Interface, Material, Specular};
 pub use mesh::Mesh;
 #[doc(hidden)]
@@ -64,7 +64,7 @@ pub struct Scene {
     /// Light sources.
     pub lights: Vec<Light>,
     /// What the scene is lit by where it has no light sources.
-    pub unlit: Unlit,
+    pub default_lighting: DefaultLighting,
     /// Viewpoints; where there are none, the view is framed on the bounds.
     pub cameras: Vec<Camera>,
     /// Light that reaches every point from everywhere, linear RGB.

@@ -26,7 +26,7 @@ use super::text::quoted;
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Integrator, Light, Material, Scene, Specular, Unlit};
+use crate::scene::{Attenuation, DefaultLighting, Integrator, Light, Material, Scene, Specular};
 
 /// What sets the material.
 const FILL: &str = "f r g b Kd Ks Shine T index";
@@ -296,7 +296,7 @@ impl Reader {
             Light::Point { position, color, attenuation, range: f64::INFINITY, radius: 0.0 }
         };
         scene.lights = self.lights.into_iter().map(light).collect();
-        scene.unlit = Unlit::Darkness;
+        scene.default_lighting = DefaultLighting::None;
         scene
     }
 }

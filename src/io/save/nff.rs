@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use super::{Unsayable, check_finite, is_colored, moves, placed, spaced, spaced_f64, wound};
 use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 use crate::scene::{
-    Alpha, Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular, Unlit,
-    choose_origin,
+    Alpha, Attenuation, Camera, DefaultLighting, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene,
+    Specular, choose_origin,
 };
 use crate::shape::Shape;
 
@@ -68,7 +68,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
             "cameras with a shift, a lens or pixels that are not square, or without perspective".to_owned(),
         );
     }
-    if scene.lights.is_empty() && scene.unlit == Unlit::Headlight {
+    if scene.lights.is_empty() && scene.default_lighting == DefaultLighting::Headlight {
         return elsewhere("light from the viewer, which scenes without lights have elsewhere".to_owned());
     }
     let is_bare = |light: &Light| matches!(light, Light::Point { attenuation: Attenuation::NONE, range, radius, .. } if range.is_infinite() && *radius == 0.0);

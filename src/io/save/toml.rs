@@ -8,8 +8,8 @@ use super::{Unsayable, check_finite, is_colored};
 use crate::image::Curve;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, UVec3, Vec3};
 use crate::scene::{
-    Absorption, Accel, Alpha, AreaShape, Attenuation, Camera, Distortion, Fog, Fov, Geometry, Interface, Light,
-    Material, Mesh, Projection, Request, Resolution, Scene, Specular, ThinLens, Unlit,
+    Absorption, Accel, Alpha, AreaShape, Attenuation, Camera, DefaultLighting, Distortion, Fog, Fov, Geometry,
+    Interface, Light, Material, Mesh, Projection, Request, Resolution, Scene, Specular, ThinLens,
 };
 use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 
@@ -166,7 +166,7 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
         Some(Resolution::Axes(UVec3 { x, y, z })) => writeln!(out, "grid = [{x}, {y}, {z}]")?,
         None => {}
     }
-    if scene.unlit == Unlit::Darkness {
+    if scene.default_lighting == DefaultLighting::None {
         writeln!(out, "headlight = false")?;
     }
     if let Some(background) = scene.background {

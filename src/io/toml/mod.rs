@@ -37,7 +37,7 @@ use super::texture;
 use crate::error::{Error, Result, Warning, one_line};
 use crate::math::Vec3;
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Camera, Geometry, Light, Material, Scene, Unlit};
+use crate::scene::{Attenuation, Camera, DefaultLighting, Geometry, Light, Material, Scene};
 use crate::shape::Shape;
 
 /// What stops the reading of a file: something in it, or in a file it names.
@@ -234,7 +234,7 @@ impl Reader<'_> {
             self.scene.lights.extend(lamps);
         }
         if !render.headlight || render.shading == Shading::Minray {
-            self.scene.unlit = Unlit::Darkness;
+            self.scene.default_lighting = DefaultLighting::None;
         }
         Ok(())
     }
