@@ -1,4 +1,4 @@
-//! The highlights of Phong (1975, *LightSample for computer generated pictures*) and Blinn (1977, *Models of light
+//! The highlights of Phong (1975, *Illumination for computer generated pictures*) and Blinn (1977, *Models of light
 //! reflection for computer synthesized pictures*), classic and energy-conserving.
 //!
 //! The classic highlight is ks cos^n: no cosine of the light, and no scale, so that wide ones send on more than they

@@ -70,7 +70,7 @@ impl Flight {
         Self { states: [RayState::NONE; RAYS], next: [Child::NONE; RAYS], tree_id: [TreeId::UPPER; RAYS] }
     }
 
-    /// RayState `k`'s next step leads to `next`, which is loaded meanwhile.
+    /// Ray `k`'s next step leads to `next`, which is loaded meanwhile.
     #[inline(always)]
     fn send<S: Simd, G: TraversalTarget>(&mut self, k: usize, next: Child, target: &G) {
         self.next[k] = next;

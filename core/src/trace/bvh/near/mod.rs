@@ -211,7 +211,7 @@ mod tests {
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::{Isa, Options, Preset};
 
-    /// RayState k asks for points k, k + [`Bvh::POINTS`] and so on.
+    /// Seeker k asks for points k, k + [`Bvh::POINTS`] and so on.
     struct Survey<'a> {
         points: &'a [Vec3],
         geometries: &'a [Vec<[Vec3; 3]>],
