@@ -65,7 +65,7 @@ pub(super) fn run(args: &RenderArgs, render: impl Fn(&RenderArgs) -> Result<()>)
         say(format_args!(
             "{:<8}  {left_out} of {} frames were there and are left as they are",
             "kept",
-            last - first + 1
+            u64::from(last - first) + 1
         ))?;
     }
     match failed {

@@ -37,7 +37,7 @@ pub(super) struct TraceArgs {
     scene: SceneArgs,
 
     /// Origin and direction, and the range of t (default: 0 to infinity)
-    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN[,TMAX]]", value_parser = hex::ray_from_text, allow_hyphen_values = true)]
+    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN[,TMAX[,TIME]]]", value_parser = hex::ray_from_text, allow_hyphen_values = true)]
     ray: Ray,
 
     #[command(flatten)]

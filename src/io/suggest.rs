@@ -1,5 +1,7 @@
 //! What a word that is not known was probably meant to be.
 
+use super::text::quoted;
+
 /// Bytes of a word that may be a misspelt one.
 const LONGEST: usize = 40;
 
@@ -25,7 +27,7 @@ pub(super) fn suggestion_or_all<'a>(word: &str, known: impl IntoIterator<Item = 
         return near;
     }
     known.sort_unstable();
-    let names: Vec<String> = known.iter().take(FEW).map(|name| format!("{name:?}")).collect();
+    let names: Vec<String> = known.iter().take(FEW).map(|name| quoted(name.as_bytes())).collect();
     let more = if known.len() > FEW { " ..." } else { "" };
     match names[..] {
         [] => format!("; there is no {table} in this file"),

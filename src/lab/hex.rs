@@ -50,13 +50,15 @@ pub fn from_text(text: &str) -> Option<f32> {
     (f64::from(x) == value && x.is_finite()).then_some(if negative { -x } else { x })
 }
 
-/// A ray as `--ray` takes it: origin, direction, tmin and tmax.
+/// A ray as `--ray` takes it: origin, direction, tmin and tmax; and its time, if that is not 0.
 pub fn ray_to_hex(ray: &Ray) -> String {
-    let Ray { origin: o, direction: d, tmin, tmax, .. } = *ray;
-    [o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax].map(to_hex).join(",")
+    let Ray { origin: o, direction: d, tmin, tmax, time } = *ray;
+    let numbers = [o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax, time];
+    let told = if time == 0.0 { &numbers[..8] } else { &numbers[..] };
+    told.iter().map(|&x| to_hex(x)).collect::<Vec<_>>().join(",")
 }
 
-/// Reads six numbers, or seven or eight with a range; otherwise what is wrong with them.
+/// Reads six numbers, or seven or eight with a range, or nine with a time, too; otherwise what is wrong with them.
 ///
 /// # Errors
 /// A sentence, where there are more or fewer numbers, and where one is none.
@@ -64,14 +66,15 @@ pub fn ray_from_text(text: &str) -> Result<Ray, String> {
     let number = |word: &str| from_text(word).ok_or_else(|| format!("{word:?} is not a number"));
     let numbers: Vec<f32> = text.split(',').map(number).collect::<Result<_, _>>()?;
     let [ox, oy, oz, dx, dy, dz, range @ ..] = &numbers[..] else {
-        return Err(format!("{} numbers; a ray is ox,oy,oz,dx,dy,dz[,tmin[,tmax]]", numbers.len()));
+        return Err(format!("{} numbers; a ray is ox,oy,oz,dx,dy,dz[,tmin[,tmax[,time]]]", numbers.len()));
     };
-    if range.len() > 2 {
-        return Err(format!("{} numbers; a ray has eight at most, ox,oy,oz,dx,dy,dz,tmin,tmax", numbers.len()));
+    if range.len() > 3 {
+        return Err(format!("{} numbers; a ray has nine at most, ox,oy,oz,dx,dy,dz,tmin,tmax,time", numbers.len()));
     }
     let mut ray = Ray::new(Vec3::new(*ox, *oy, *oz), Vec3::new(*dx, *dy, *dz));
     ray.tmin = range.first().copied().unwrap_or(ray.tmin);
     ray.tmax = range.get(1).copied().unwrap_or(ray.tmax);
+    ray.time = range.get(2).copied().unwrap_or(ray.time);
     Ok(ray)
 }
 
@@ -117,7 +120,9 @@ mod tests {
         assert_eq!(ray_from_text("0,0,1, 0,0,-1"), Ok(Ray::new(Vec3::Z, Vec3::NEG_Z)));
         assert!(ray_from_text("1,2,3").unwrap_err().contains("3 numbers"));
         assert!(ray_from_text("1,2,3,4,five,6").unwrap_err().contains("five"));
-        assert!(ray_from_text("1,2,3,4,5,6,7,8,9").unwrap_err().contains("eight at most"));
+        assert!(ray_from_text("1,2,3,4,5,6,7,8,9,10").unwrap_err().contains("nine at most"));
+        let moving = Ray { time: 0.25, ..Ray::new(Vec3::X, Vec3::Y) };
+        assert_eq!(ray_from_text(&ray_to_hex(&moving)), Ok(moving));
     }
 
     #[test]

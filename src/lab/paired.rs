@@ -187,7 +187,7 @@ impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.class.name())?;
         let answer = |hit: Option<Hit>| match hit {
-            Some(Hit { t, primitive, geometry, instance, .. }) => format!("{instance}/{geometry}/{primitive} at {t}"),
+            Some(Hit { t, primitive, geometry, instance, .. }) => format!("{instance}/{geometry}/{primitive} at {t:?}"),
             None => "miss".to_owned(),
         };
         match self.asked {
@@ -201,9 +201,6 @@ impl fmt::Display for Difference {
                 let word = |occluded| if occluded { "occluded" } else { "free" };
                 write!(f, "native {}, embree {}", word(native), word(embree))?;
             }
-        }
-        if self.ray.time != 0.0 {
-            write!(f, ", at time {}", self.ray.time)?;
         }
         write!(f, "; --ray {}", hex::ray_to_hex(&self.ray))
     }

@@ -338,6 +338,7 @@ fn faults_are_told_with_line_and_remedy() {
             4,
             "of at most",
         ),
+        ("[render]\nspp = 0x10001\n", 2, "0x10001 where \"spp\" wants a whole number from 1 to"),
         ("[render]\nspp = 1.5\n", 2, "1.5 where \"spp\" wants a whole number from 1 to"),
         ("[render]\naccel = \"octre\"\n", 2, "did you mean \"octree\"?"),
         ("[render]\ngrid = 5\n", 2, "write that, too"),

@@ -45,7 +45,7 @@ fn crossings(triangles: &[Triangle], ray: &Ray) -> (BTreeMap<Id, f64>, usize) {
         let normal = cross(&zip(&corners[1], &corners[0], Dyadic::sub), &zip(&corners[2], &corners[0], Dyadic::sub));
         let height = dot(&zip(&corners[0], &origin, Dyadic::sub), &normal);
         let t = Rational::new(height, dot(&d, &normal)).expect("it is not parallel").to_f64();
-        if !(ray.tmin..=ray.tmax).contains(&(t as f32)) {
+        if t < 0.0 || !(ray.tmin..=ray.tmax).contains(&(t as f32)) {
             continue;
         }
         let is_crossed = volumes(&moved, &d, &corners).iter().map(Dyadic::signum).collect::<Vec<_>>();

@@ -10,8 +10,8 @@ use crate::trace::World;
 /// light that grows without bound.
 ///
 /// What a ray sees is weighted along its way by what mirrors and glass leave of it. Glass has light denser within than
-/// outside, by the square of its index (`Way::scale`): a ray may weigh so much less within than what comes of it, which
-/// is counted here.
+/// outside, by the square of its index (`SpecularDirection::scale`): a ray may weigh so much less within than what
+/// comes of it, which is counted here.
 pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
     // They take a look at every triangle, and only lamps ask for them.
     let bounds = LazyCell::new(|| world.bounds());

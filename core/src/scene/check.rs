@@ -80,7 +80,7 @@ pub fn fault(scene: &Scene) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// Whether the groups that are placed, and their geometries, are there.
+/// Whether the groups that are placed, and the geometries of all groups, are there.
 pub fn references(scene: &Scene) -> std::result::Result<(), String> {
     if let Some(group) = scene.groups.iter().find(|group| !scene.has_geometries(group)) {
         return Err(format!("group {:?} has geometries that do not exist", group.name));

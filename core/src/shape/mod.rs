@@ -213,13 +213,13 @@ impl Shape {
         }
     }
 
-    /// The nearest intersection with `tmin <= t <= tmax`, for t rounded to f32.
+    /// The nearest intersection that is not behind the origin, with `tmin <= t <= tmax`, for t rounded to f32.
     pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
         self.intersect_all(ray).next()
     }
 
-    /// Every intersection with `tmin <= t <= tmax`, the nearest first; an even number over the whole line for closed
-    /// shapes, of which a line that touches crosses twice in one place.
+    /// Every intersection that is not behind the origin, with `tmin <= t <= tmax`, the nearest first; an even number
+    /// over the whole line for closed shapes, of which a line that touches crosses twice in one place.
     pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
         let ray = *ray;
         self.crossings(&ray).map(move |t| self.hit_at(&ray, t))

@@ -71,7 +71,7 @@ impl TriangleMethod {
             Self::Exact => return triangle::intersect(ray, &corners),
         };
         let [t, u, v] = found.map(|found| [found.t, found.u, found.v])?;
-        let in_range = ray.tmin <= t && t <= ray.tmax && t.is_finite();
+        let in_range = ray.reaches(t.into());
         in_range.then(|| TriangleHit { t: t.into(), u: u.into(), v: v.into() })
     }
 }

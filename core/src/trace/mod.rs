@@ -24,8 +24,8 @@ use crate::ray::{Hit, Ray};
 
 /// An engine that finds where rays meet a scene.
 ///
-/// Every engine obeys the same conventions: a hit counts for `tmin <= t <= tmax`; at equal t the lowest (instance,
-/// geometry, primitive) wins; a ray that [is not valid](Ray::is_valid) misses.
+/// Every engine obeys the same conventions: a hit counts if it is not behind the origin, and for `tmin <= t <= tmax`;
+/// at equal t the lowest (instance, geometry, primitive) wins; a ray that [is not valid](Ray::is_valid) misses.
 ///
 /// The two required methods define the answer; the batch methods give the same answers for many rays at a time, and
 /// an engine overrides them where it has something faster.

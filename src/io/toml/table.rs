@@ -262,7 +262,8 @@ fn shown(value: &DeValue<'_>) -> String {
     const SHORT: usize = 5;
     match value {
         DeValue::String(text) => format!("the text {}", quoted(text.as_bytes())),
-        DeValue::Integer(number) => shortened(number.as_str()),
+        // With its radix.
+        DeValue::Integer(number) => shortened(&number.to_string()),
         DeValue::Float(number) => shortened(number.as_str()),
         DeValue::Boolean(flag) => flag.to_string(),
         DeValue::Datetime(_) => "a date".to_owned(),

@@ -24,8 +24,8 @@ use crate::trace::crossings::Crossings;
 use crate::trace::leaf::InstanceTransform;
 
 impl Bvh {
-    /// All hits of `ray` with `tmin <= t <= tmax`, into `hits`, which is cleared first: ordered by t (in f64, before it
-    /// is rounded), then by id.
+    /// All hits of `ray` that are not behind its origin, with `tmin <= t <= tmax`, into `hits`, which is cleared first:
+    /// ordered by t (in f64, before it is rounded), then by id.
     ///
     /// Each crossing counts once. A closed mesh is hit an even number of times from outside and an odd number from
     /// inside, also by a ray through its edges and corners. There the lowest id among the triangles that touch stands

@@ -161,7 +161,7 @@ impl Answer for f64 {
     }
 }
 
-/// Points of which one traveller takes one after the other.
+/// Points of which one seeker takes one after the other.
 struct Run<'a, A> {
     points: &'a [DVec3],
     answers: &'a mut [A],
@@ -176,8 +176,8 @@ struct Survey<'a, A> {
 }
 
 impl<A: Answer> Surveyor for Survey<'_, A> {
-    fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought> {
-        let run = &mut self.runs[traveller];
+    fn next(&mut self, seeker: usize, last: Option<NearestTriangle>) -> Option<Sought> {
+        let run = &mut self.runs[seeker];
         if let Some(nearest) = last {
             let asked = run.asked - 1;
             run.answers[asked] = A::of(self.precise, run.points[asked], &nearest);

@@ -22,8 +22,8 @@ _Mesh = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 
 #: The most of the numbers that the native part has in 32 bits.
 _U32 = 2**32 - 1
-# `scene::MOST_DEPTH` of the library.
-_MOST_DEPTH = 1000
+# `scene::MAX_DEPTH` of the library.
+_MAX_DEPTH = 1000
 
 
 def render(
@@ -102,7 +102,7 @@ def render(
         "seed": None if seed is None else _arguments.whole("seed", seed, most=2**64 - 1),
         "camera": _arguments.text("camera", camera),
         "integrator": _arguments.text("integrator", integrator),
-        "max_depth": None if max_depth is None else _arguments.whole("max_depth", max_depth, most=_MOST_DEPTH),
+        "max_depth": None if max_depth is None else _arguments.whole("max_depth", max_depth, most=_MAX_DEPTH),
         "background": None if background is None else _arrays.vector("background", background).tolist(),
         "threads": _arguments.whole("threads", threads),
     }

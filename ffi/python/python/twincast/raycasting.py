@@ -296,11 +296,11 @@ def _threads(nthreads: Any) -> int:
 
 
 # A majority is settled long before, and nothing is looked at in between.
-_MOST_SAMPLES = 9_999
+_MAX_SAMPLES = 9_999
 
 
 def _samples(nsamples: Any) -> int:
-    samples = _arguments.whole("nsamples", nsamples, least=1, most=_MOST_SAMPLES)
+    samples = _arguments.whole("nsamples", nsamples, least=1, most=_MAX_SAMPLES)
     if samples % 2 == 0:
         raise ValueError(f"nsamples must be an odd number, not {samples}")
     return samples

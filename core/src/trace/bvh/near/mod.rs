@@ -80,10 +80,10 @@ impl Bvh {
         Discs::new(&self.fixed.triangles)
     }
 
-    /// Finds the nearest fixed triangle of each point that is asked for, by so many count, no more than
+    /// Finds the nearest fixed triangle of each point that is asked for, by `count` seekers, no more than
     /// [`Self::POINTS`]; where there are no triangles nobody is asked. `discs` are this tree's.
     pub(in crate::trace) fn nearest_triangles(&self, discs: &Discs, count: usize, surveyor: &mut impl Surveyor) {
-        debug_assert!(count <= Self::POINTS, "{count} count");
+        debug_assert!(count <= Self::POINTS, "{count} seekers");
         let triangles = &self.fixed.triangles;
         if !triangles.tree().is_empty() {
             let mut seekers = vec![Seeker::IDLE; count.min(Self::POINTS)];
