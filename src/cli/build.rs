@@ -122,3 +122,20 @@ fn advice(problem: &NotEnoughMemory) -> String {
     };
     format!("give at least --max-memory {}M, or {instead}", problem.enough().div_ceil(1 << 20))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_advised_would_do() {
+        let problem = |preset| NotEnoughMemory { preset, needed: (500 << 20) + 38_000_000, limit: 500 << 20 };
+        // A thirty-second more than is needed.
+        let of_least = advice(&problem(Some(Preset::FastCompact)));
+        assert!(of_least.contains("--max-memory 553M, or a smaller mesh"), "{of_least}");
+        // No other build would do.
+        assert!(!of_least.contains("--build auto"), "{of_least}");
+        assert!(advice(&problem(Some(Preset::High))).contains("--build auto"));
+        assert!(advice(&problem(None)).contains("--backend native"));
+    }
+}

@@ -106,7 +106,7 @@ pub(super) fn run(args: &StressArgs) -> Result<()> {
             args.cases.iter().map(PathBuf::from).filter(|path| file::is_case_file(path)).collect();
         outputs::check(&[], &files, &cases)?;
     }
-    let control = Control { cancel: Some(cancel), ..Control::default() };
+    let control = Control::stopping(Some(cancel));
     match args.search {
         Some(seconds) => search(args, columns, Duration::from_secs(seconds), control),
         None => matrix(args, columns, control),

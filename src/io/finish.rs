@@ -51,7 +51,7 @@ pub(super) fn finish(
             format!("{strays} triangles have corners that are NaN, infinite or too far away; no ray hits them");
         warnings.push(Warning::new(path, "", message));
     }
-    if !may_be_empty && !scene.geometries.iter().any(can_be_hit) {
+    if !may_be_empty && !scene.geometries.iter().any(Geometry::has_area) {
         let message = "no ray hits anything: none of its triangles has an area, and corners that can be traced";
         warnings.push(Warning::new(path, "", message));
     }
@@ -85,13 +85,6 @@ fn finish_meshes(scene: &mut Scene, normals: Normals) -> usize {
         }
     }
     strays
-}
-
-fn can_be_hit(geometry: &Geometry) -> bool {
-    match geometry {
-        Geometry::Mesh(mesh) => mesh.has_area(),
-        Geometry::Shapes { shapes, .. } => !shapes.is_empty(),
-    }
 }
 
 /// Of a file without a primitive; with what was left out of it, which may be why.

@@ -200,14 +200,19 @@ fn not_finite(word: &str) -> Option<&'static str> {
     kind.starts_with("inf").then_some(if is_negative { "-inf" } else { "inf" })
 }
 
-/// Bytes for a message: as text, shortened to 40 characters.
+/// Bytes for a message: as text in quotes, shortened to 40 characters.
 pub(super) fn quoted(bytes: &[u8]) -> String {
+    format!("{:?}", excerpt(bytes))
+}
+
+/// Bytes as text, shortened to 40 characters.
+pub(super) fn excerpt(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(160)]);
     let mut short: String = text.chars().take(40).collect();
     if short.len() < text.len() || bytes.len() > 160 {
         short.push('…');
     }
-    format!("{short:?}")
+    short
 }
 
 /// A name in a file, as text. One that is not UTF-8 is taken for Latin-1, in which every byte is a letter: whatever it

@@ -31,6 +31,8 @@ pub use reduction::{Complete, Reduction};
 pub use report::PlanReport;
 pub use work::{ROULETTE_MIN_DEPTH, Rays, Work};
 
+use std::cell::OnceCell;
+
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::scene::{DefaultLighting, Fog, Integrator, Scene};
@@ -141,7 +143,7 @@ impl Plan {
 
     /// The same of a scene that is counted already.
     pub fn of_census(scene: &Scene, world: &World, options: &PlanOptions, census: &Census) -> Self {
-        let inputs = PlanInputs { scene, world, options, census };
+        let inputs = PlanInputs { scene, world, options, census, bodies: OnceCell::new() };
         let (integrator, why) = inputs.integrator();
         let depth = inputs.depth(integrator);
         let needed = inputs.lighting(integrator);
@@ -215,6 +217,8 @@ struct PlanInputs<'a> {
     world: &'a World,
     options: &'a PlanOptions,
     census: &'a Census,
+    /// [`PlanInputs::has_bodies`], once it has been asked for.
+    bodies: OnceCell<bool>,
 }
 
 impl PlanInputs<'_> {
@@ -230,11 +234,9 @@ impl PlanInputs<'_> {
     /// Whether anything glows that light comes from, and is no light's body.
     fn has_bodies(&self) -> bool {
         let Self { scene, world, census, .. } = self;
-        if census.materials.glowing == 0 {
-            return false;
-        }
         let source = |&i: &usize| LightSource::new(&scene.lights[i], world.centre);
-        has_emitters(scene, world, &census.lights.bright.iter().map(source).collect::<Vec<_>>())
+        let sources = || census.lights.bright.iter().map(source).collect::<Vec<_>>();
+        *self.bodies.get_or_init(|| census.materials.glowing > 0 && has_emitters(scene, world, &sources()))
     }
 
     /// Whether what glows would light something if paths were traced, which is left to whoever asks for them.

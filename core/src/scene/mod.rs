@@ -113,6 +113,15 @@ impl Geometry {
         }
     }
 
+    /// Whether there is anything that a ray can hit: a triangle with an area, or a shape.
+    #[doc(hidden)]
+    pub fn has_area(&self) -> bool {
+        match self {
+            Self::Mesh(mesh) => mesh.has_area(),
+            Self::Shapes { shapes, .. } => !shapes.is_empty(),
+        }
+    }
+
     /// The bounds of its traceable vertices under `transform`, exact up to f64 rounding for meshes.
     pub fn bounds(&self, transform: &DAffine3) -> DAabb {
         match self {

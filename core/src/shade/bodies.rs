@@ -12,6 +12,15 @@ const CORNER: f64 = 1e-3;
 /// How far the middle of a triangle may be off: a ball is seldom round.
 const MIDDLE: f64 = 0.1;
 
+/// Whether a light has a surface that something may stand in the place of.
+pub(super) const fn may_have(light: &Light) -> bool {
+    match light {
+        Light::Directional { .. } | Light::Spot { .. } => false,
+        Light::Point { radius, .. } => *radius > 0.0,
+        Light::Area { .. } => true,
+    }
+}
+
 /// Whether a triangle lies on the surface of `light`.
 pub(super) fn has_triangle(light: &Light, corners: [DVec3; 3]) -> bool {
     let middle = (corners[0] + corners[1] + corners[2]) / 3.0;

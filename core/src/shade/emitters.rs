@@ -13,7 +13,7 @@ use super::bodies;
 use super::light::{LightSample, LightSource};
 use crate::math::{Aabb, DAffine3, DMat3, DVec2, DVec3, Vec3, similarity, tangents};
 use crate::ray::Hit;
-use crate::scene::{Alpha, AreaShape, Geometry, Light, Material, Scene};
+use crate::scene::{Alpha, AreaShape, Light, Material, Scene};
 use crate::shape::Shape;
 use crate::trace::{Primitives, World};
 
@@ -140,17 +140,11 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
 
 /// Whether anything glows that is no body of `lights`.
 pub(super) fn any(scene: &Scene, world: &World, lights: &[LightSource]) -> bool {
-    let may_have_body = |light: &LightSource| match light.light() {
-        Some(Light::Area { .. }) => true,
-        Some(Light::Point { radius, .. }) => *radius > 0.0,
-        _ => false,
-    };
-    if !lights.iter().any(may_have_body) {
+    if !lights.iter().filter_map(LightSource::light).any(bodies::may_have) {
         // Then the first that has an area will do, and nothing needs to be gathered.
-        return placed(scene, is_emitter).into_iter().any(|(_, geometry)| match &scene.geometries[geometry as usize] {
-            Geometry::Mesh(mesh) => mesh.has_area(),
-            Geometry::Shapes { shapes, .. } => !shapes.is_empty(),
-        });
+        return placed(scene, is_emitter)
+            .into_iter()
+            .any(|(_, geometry)| scene.geometries[geometry as usize].has_area());
     }
     let mut all = lights.to_vec();
     let Emitters { patches, glowing, .. } = find(scene, world, &mut all);

@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 use ::toml::de::{DeTable, DeValue};
 
 use crate::io::suggest::{is_slip, suggestion};
-use crate::io::text::quoted;
+use crate::io::text::{excerpt, quoted};
 use crate::math::{DVec3, Vec3};
 
 /// What is wrong, and where in the text.
@@ -263,8 +263,8 @@ fn shown(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("the text {}", quoted(text.as_bytes())),
         // With its radix.
-        DeValue::Integer(number) => shortened(&number.to_string()),
-        DeValue::Float(number) => shortened(number.as_str()),
+        DeValue::Integer(number) => excerpt(number.to_string().as_bytes()),
+        DeValue::Float(number) => excerpt(number.as_str().as_bytes()),
         DeValue::Boolean(flag) => flag.to_string(),
         DeValue::Datetime(_) => "a date".to_owned(),
         DeValue::Array(items) if items.len() <= SHORT && !items.iter().any(|item| item.get_ref().is_table()) => {
@@ -283,9 +283,4 @@ fn within(value: &DeValue<'_>) -> String {
         DeValue::Array(_) => "[...]".to_owned(),
         other => shown(other),
     }
-}
-
-/// A number, of which no more than some digits are shown.
-fn shortened(number: &str) -> String {
-    quoted(number.as_bytes()).trim_matches('"').to_owned()
 }

@@ -2,6 +2,8 @@
 
 use crate::math::{self, Aabb, DVec3, Vec3};
 use crate::ray::Ray;
+use crate::trace::bvh::node::Child;
+use crate::trace::bvh::simd::isa::Present;
 
 /// [`math::Random`], about zero.
 pub(super) struct Random(math::Random);
@@ -46,5 +48,26 @@ impl Random {
         let low = |v: DVec3| Vec3::new(below(v.x), below(v.y), below(v.z));
         let ray = Ray { tmin: t, tmax: t, ..Ray::new(origin, direction) };
         ray.is_valid().then(|| (ray, Aabb { min: low(point - off), max: -low(-point - off) }))
+    }
+}
+
+/// On a stack of so many entries at most, the one at the bottom among them, what is beyond a limit goes, and all else
+/// stays in its order, whatever the instruction set: `kept` has the entries above the bottom, each with where it is
+/// entered (the lowest three bits are not part of that), and tells what the stack keeps of them.
+pub(super) fn entries_beyond_a_limit_go(
+    lens: impl IntoIterator<Item = usize>,
+    mut kept: impl FnMut(Present, &[(u32, Child)], f32) -> Vec<(u32, Child)>,
+) {
+    let mut random = Random::new(4);
+    for len in lens {
+        for limit in [0.0, 0.3, 0.5, 1.0] {
+            let entries: Vec<_> =
+                (1..len as u32).map(|i| ((random.vec3().x.abs().to_bits() & !7) | (i % 8), Child::inner(i))).collect();
+            let mut expected = entries.clone();
+            expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
+            for isa in Present::all() {
+                assert_eq!(kept(isa, &entries, limit), expected, "{isa:?}: {len} entries, up to {limit}");
+            }
+        }
     }
 }

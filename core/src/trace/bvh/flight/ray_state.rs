@@ -304,8 +304,8 @@ impl RayState {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::bvh::random::Random;
-    use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
+    use crate::trace::bvh::random::entries_beyond_a_limit_go;
+    use crate::trace::bvh::simd::isa::{Kernel, dispatch};
 
     struct Shorten<'a>(&'a mut RayState);
 
@@ -321,26 +321,16 @@ mod tests {
     /// What is beyond the limit goes, all else stays in its order, however much is on the stack.
     #[test]
     fn what_is_beyond_the_limit_goes() {
-        let mut random = Random::new(4);
-        for len in [1, 2, 8, 9, 10, 17, 26, 100, STACK - 1] {
-            for limit in [0.0, 0.3, 0.5, 1.0] {
-                let entries: Vec<_> = (1..len as u32)
-                    .map(|i| ((random.vec3().x.abs().to_bits() & !7) | (i % 8), Child::inner(i)))
-                    .collect();
-                let mut expected = entries.clone();
-                expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
-                for isa in Present::all() {
-                    let mut state = RayState { len, ..RayState::NONE };
-                    state.found.limit = limit;
-                    for (i, &(near, child)) in entries.iter().enumerate() {
-                        (state.near[i + 1], state.stack[i + 1]) = (near, child);
-                    }
-                    dispatch(isa, Shorten(&mut state));
-                    let kept = state.near.0.into_iter().zip(state.stack.0).take(state.len).skip(1);
-                    assert_eq!(kept.collect::<Vec<_>>(), expected, "{isa:?}: {len} entries, up to {limit}");
-                    assert_eq!(state.stack[0], Child::NONE);
-                }
+        let lens = [1, 2, 8, 9, 10, 17, 26, 100, STACK - 1];
+        entries_beyond_a_limit_go(lens, |isa, entries, limit| {
+            let mut state = RayState { len: entries.len() + 1, ..RayState::NONE };
+            state.found.limit = limit;
+            for (i, &(near, child)) in entries.iter().enumerate() {
+                (state.near[i + 1], state.stack[i + 1]) = (near, child);
             }
-        }
+            dispatch(isa, Shorten(&mut state));
+            assert_eq!(state.stack[0], Child::NONE);
+            state.near.0.into_iter().zip(state.stack.0).take(state.len).skip(1).collect()
+        });
     }
 }
